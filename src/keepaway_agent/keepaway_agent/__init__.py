@@ -1,0 +1,1 @@
+"""Keepaway's players: perceive, decide, learn."""

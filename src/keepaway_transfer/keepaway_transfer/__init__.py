@@ -1,0 +1,1 @@
+"""From task to task, and was it worth it: mappings, rho, studies."""

@@ -1,0 +1,26 @@
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+package = ElementTree.parse(Path(__file__).with_name("package.xml")).getroot()
+name = package.findtext("name")
+
+setup(
+    name=name,
+    version=package.findtext("version"),
+    description=package.findtext("description"),
+    license=package.findtext("license"),
+    packages=find_packages(include=[name, f"{name}.*"]),
+    package_data={name: ["**/*.json", "**/*.yaml", "py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
+        (f"share/{name}", ["package.xml"]),
+    ],
+    entry_points={
+        "console_scripts": [
+            "transfer = keepaway_transfer.nodes.transfer:main",
+        ],
+    },
+    zip_safe=False,
+)
