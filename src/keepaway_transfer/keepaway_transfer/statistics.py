@@ -1,0 +1,196 @@
+"""Intervals and tests for the times of many trials, on scipy and statsmodels.
+
+Values are one number a trial. A trial that never reached its threshold is right-censored:
+`reached` is False and its time is how long it ran. Every random draw comes from the Generator
+passed in.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from statsmodels.duration.survfunc import SurvfuncRight
+from statsmodels.stats.multitest import multipletests
+from statsmodels.stats.power import TTestIndPower
+
+CONFIDENCE = 0.95
+RESAMPLES = 10_000
+
+Floats = NDArray[np.float64]
+
+
+class Interval(NamedTuple):
+    """An estimate and the ends of its confidence interval."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+class Comparison(NamedTuple):
+    """Difference of two means with its confidence interval and the p-value of no difference."""
+
+    difference: float
+    low: float
+    high: float
+    p_value: float
+
+
+class SurvivalCurve(NamedTuple):
+    """Kaplan-Meier estimate: the share of trials still short of the threshold from each time on."""
+
+    times: Floats  # (num_times,) when some trial reached the threshold
+    share: Floats  # (num_times,)
+    variance: Floats  # (num_times,) Greenwood's sum of d / (n (n - d)) up to each; d reached of n
+
+
+def welch(first: ArrayLike, second: ArrayLike, confidence: float = CONFIDENCE) -> Comparison:
+    """Welch's t-test of mean(first) - mean(second), two-sided, variances not assumed equal."""
+    test = stats.ttest_ind(np.asarray(first, float), np.asarray(second, float), equal_var=False)
+    low, high = test.confidence_interval(confidence)
+    return Comparison(
+        float(np.mean(first) - np.mean(second)), float(low), float(high), float(test.pvalue)
+    )
+
+
+def bootstrap_mean(
+    values: ArrayLike, generator: np.random.Generator, confidence: float = CONFIDENCE
+) -> Interval:
+    """The mean with its bias-corrected accelerated bootstrap interval.
+
+    The interval is a point if the values are all equal.
+    """
+    values = np.asarray(values, float)
+    mean = float(np.mean(values))
+    if len(values) < 2 or np.ptp(values) == 0:
+        return Interval(mean, mean, mean)
+    result = stats.bootstrap(
+        (values,),
+        np.mean,
+        confidence_level=confidence,
+        n_resamples=RESAMPLES,
+        rng=generator,
+        vectorized=True,
+    )
+    return Interval(
+        mean, float(result.confidence_interval.low), float(result.confidence_interval.high)
+    )
+
+
+def clustered_bootstrap(
+    values: ArrayLike,
+    clusters: ArrayLike,
+    generator: np.random.Generator,
+    confidence: float = CONFIDENCE,
+) -> Interval:
+    """The mean with its percentile interval when whole clusters (source runs) are drawn again."""
+    sums, counts = _per_cluster(values, clusters)
+    draws = generator.integers(len(sums), size=(RESAMPLES, len(sums)))
+    means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
+    return Interval(float(np.mean(values)), *_percentiles(means, confidence))
+
+
+def paired_bootstrap(
+    first: ArrayLike,
+    second: ArrayLike,
+    generator: np.random.Generator,
+    confidence: float = CONFIDENCE,
+) -> Interval:
+    """Mean of first - second where entry i of both comes from the same source run i."""
+    differences = np.subtract(first, second)
+    return clustered_bootstrap(differences, np.arange(len(differences)), generator, confidence)
+
+
+def kaplan_meier(times: ArrayLike, reached: ArrayLike) -> SurvivalCurve:
+    """Share of trials that have not reached the threshold, as a function of time.
+
+    >>> kaplan_meier([1.0, 2.0, 3.0], [True, False, True]).share.round(3)
+    array([0.667, 0.   ])
+    """
+    curve = SurvfuncRight(np.asarray(times, float), np.asarray(reached, int))
+    at_risk, events = np.asarray(curve.n_risk, float), np.asarray(curve.n_events, float)
+    left = at_risk - events
+    terms = np.divide(events, at_risk * left, out=np.zeros_like(left), where=left > 0)
+    return SurvivalCurve(
+        np.asarray(curve.surv_times), np.asarray(curve.surv_prob), np.cumsum(terms)
+    )
+
+
+def restricted_mean(
+    times: ArrayLike, reached: ArrayLike, limit: float, confidence: float = CONFIDENCE
+) -> Interval:
+    """Mean time to the threshold counted up to `limit`: the area under the Kaplan-Meier curve.
+
+    The interval is the normal one with Greenwood's variance (Klein & Moeschberger, Survival
+    Analysis, section 4.5).
+    """
+    curve = kaplan_meier(times, reached)
+    inside = curve.times < limit
+    edges = np.concatenate([[0.0], curve.times[inside], [limit]])
+    heights = np.concatenate([[1.0], curve.share[inside]])
+    areas = np.diff(edges) * heights
+    beyond = np.cumsum(areas[::-1])[::-1][1:]  # area to the right of each time inside
+    jumps = np.diff(np.concatenate([[0.0], curve.variance[inside]]))
+    error = math.sqrt(float(np.sum(beyond**2 * jumps)))
+    mean, half = float(np.sum(areas)), float(stats.norm.ppf((1 + confidence) / 2)) * error
+    return Interval(mean, mean - half, mean + half)
+
+
+def logrank(
+    first: ArrayLike, first_reached: ArrayLike, second: ArrayLike, second_reached: ArrayLike
+) -> float:
+    """The p-value of the two-sided log-rank test that both arms reach the threshold alike."""
+    return float(
+        stats.logrank(_censored(first, first_reached), _censored(second, second_reached)).pvalue
+    )
+
+
+def holm(p_values: ArrayLike) -> Floats:
+    """Holm's step-down adjustment of the p-values of one table.
+
+    >>> holm([0.01, 0.04, 0.03])
+    array([0.03, 0.06, 0.06])
+    """
+    adjusted: Floats = multipletests(np.asarray(p_values, float), method="holm")[1]
+    return adjusted
+
+
+def trials_needed(effect: float, variation: float, power: float = 0.8, alpha: float = 0.05) -> int:
+    """Trials an arm to see a relative difference `effect` of the means.
+
+    `variation` is the coefficient of variation of the times within an arm.
+
+    >>> trials_needed(effect=0.20, variation=0.25), trials_needed(effect=0.10, variation=0.25)
+    (26, 100)
+    """
+    size = effect / variation
+    return math.ceil(TTestIndPower().solve_power(effect_size=size, power=power, alpha=alpha))
+
+
+def detectable_effect(
+    trials: int, variation: float, power: float = 0.8, alpha: float = 0.05
+) -> float:
+    """The smallest relative difference of means that `trials` an arm see with this power.
+
+    >>> round(detectable_effect(trials=100, variation=0.25), 3)
+    0.1
+    """
+    size = TTestIndPower().solve_power(nobs1=trials, power=power, alpha=alpha)
+    return float(size) * variation
+
+
+def _per_cluster(values: ArrayLike, clusters: ArrayLike) -> tuple[Floats, Floats]:
+    _, cluster = np.unique(np.asarray(clusters), return_inverse=True)
+    sums = np.bincount(cluster, weights=np.asarray(values, float))
+    return sums, np.bincount(cluster).astype(float)
+
+
+def _percentiles(values: Floats, confidence: float) -> tuple[float, float]:
+    low, high = np.quantile(values, [(1 - confidence) / 2, (1 + confidence) / 2])
+    return float(low), float(high)
+
+
+def _censored(times: ArrayLike, reached: ArrayLike) -> stats.CensoredData:
+    return stats.CensoredData.right_censored(np.asarray(times, float), ~np.asarray(reached, bool))
