@@ -1,4 +1,7 @@
-"""Starts a whole match with an ordinary ROS 2: `ros2 launch keepaway_sim match.launch.py task:=4v3 speed:=1.0`."""
+"""Starts a whole match with an ordinary ROS 2.
+
+ros2 launch keepaway_sim match.launch.py task:=4v3 keeper_policy:=learn speed:=1.0
+"""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
