@@ -43,7 +43,7 @@ class KeepawayLog:
     @property
     def durations(self) -> NDArray[np.float64]:
         """How long each episode lasted, (num_episodes,) [s]."""
-        return self.cycles * CYCLE_TIME
+        return self.cycles.astype(np.float64) * CYCLE_TIME
 
 
 def read_kwy(path: Path | str) -> KeepawayLog:

@@ -19,13 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from keepaway_agent.actions import Role
+from keepaway_agent.actions import Role, keeper_action_names
 from keepaway_agent.features import feature_names
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError
 
 ZERO = "zero"
-HOLD = "hold"
 
 
 def state_variables(task: str) -> tuple[str, ...]:
@@ -44,15 +43,7 @@ def actions(task: str) -> tuple[str, ...]:
     >>> actions("3v2")
     ('hold', 'pass_k2', 'pass_k3')
     """
-    return (HOLD, *(f"pass_{keeper}" for keeper in _mates(task)))
-
-
-def _mates(task: str) -> list[str]:
-    return [f"k{rank}" for rank in range(2, Task.parse(task).num_keepers + 1)]
-
-
-def _takers(task: str) -> list[str]:
-    return [f"t{rank}" for rank in range(1, Task.parse(task).num_takers + 1)]
+    return keeper_action_names(Task.parse(task).num_keepers)
 
 
 @dataclass(frozen=True)
@@ -163,14 +154,16 @@ def _known_players(source: str, target: str) -> Task:
 
 
 def _renamed(source: str, target: str, *, new_keeper: str, new_taker: str) -> InterTaskMapping:
-    known = {"k1", *_mates(source), *_takers(source)}
+    known = Task.parse(source)
 
     def stand_in(player: re.Match[str]) -> str:
-        name = player.group()
-        return name if name in known else new_keeper if name[0] == "k" else new_taker
+        team, rank = player[1], int(player[2])
+        if team == "k":
+            return player[0] if rank <= known.num_keepers else new_keeper
+        return player[0] if rank <= known.num_takers else new_taker
 
     def chi(names: tuple[str, ...]) -> dict[str, str]:
-        return {name: re.sub(r"[kt]\d+", stand_in, name) for name in names}
+        return {name: re.sub(r"([kt])(\d+)", stand_in, name) for name in names}
 
     return InterTaskMapping(source, target, chi(state_variables(target)), chi(actions(target)))
 

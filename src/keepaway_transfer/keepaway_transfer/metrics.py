@@ -38,7 +38,8 @@ def windowed_mean(durations: ArrayLike, window: int = WINDOW) -> Floats:
     array([1.5, 2.5, 5. ])
     """
     sums = np.concatenate([[0.0], np.cumsum(durations, dtype=np.float64)])
-    return (sums[window:] - sums[:-window]) / window
+    means: Floats = (sums[window:] - sums[:-window]) / window
+    return means
 
 
 def time_to_threshold(

@@ -48,11 +48,10 @@ class SurvivalCurve(NamedTuple):
 
 def welch(first: ArrayLike, second: ArrayLike, confidence: float = CONFIDENCE) -> Comparison:
     """Welch's t-test of mean(first) - mean(second), two-sided, variances not assumed equal."""
-    test = stats.ttest_ind(np.asarray(first, float), np.asarray(second, float), equal_var=False)
+    one, other = _floats(first), _floats(second)
+    test = stats.ttest_ind(one, other, equal_var=False)
     low, high = test.confidence_interval(confidence)
-    return Comparison(
-        float(np.mean(first) - np.mean(second)), float(low), float(high), float(test.pvalue)
-    )
+    return Comparison(float(one.mean() - other.mean()), float(low), float(high), float(test.pvalue))
 
 
 def bootstrap_mean(
@@ -62,8 +61,8 @@ def bootstrap_mean(
 
     The interval is a point if the values are all equal.
     """
-    values = np.asarray(values, float)
-    mean = float(np.mean(values))
+    values = _floats(values)
+    mean = float(_floats(values).mean())
     if len(values) < 2 or np.ptp(values) == 0:
         return Interval(mean, mean, mean)
     result = stats.bootstrap(
@@ -89,7 +88,7 @@ def clustered_bootstrap(
     sums, counts = _per_cluster(values, clusters)
     draws = generator.integers(len(sums), size=(RESAMPLES, len(sums)))
     means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
-    return Interval(float(np.mean(values)), *_percentiles(means, confidence))
+    return Interval(float(_floats(values).mean()), *_percentiles(means, confidence))
 
 
 def paired_bootstrap(
@@ -109,7 +108,7 @@ def kaplan_meier(times: ArrayLike, reached: ArrayLike) -> SurvivalCurve:
     >>> kaplan_meier([1.0, 2.0, 3.0], [True, False, True]).share.round(3)
     array([0.667, 0.   ])
     """
-    curve = SurvfuncRight(np.asarray(times, float), np.asarray(reached, int))
+    curve = SurvfuncRight(_floats(times), np.asarray(reached, int))
     at_risk, events = np.asarray(curve.n_risk, float), np.asarray(curve.n_events, float)
     left = at_risk - events
     terms = np.divide(events, at_risk * left, out=np.zeros_like(left), where=left > 0)
@@ -153,7 +152,7 @@ def holm(p_values: ArrayLike) -> Floats:
     >>> holm([0.01, 0.04, 0.03])
     array([0.03, 0.06, 0.06])
     """
-    adjusted: Floats = multipletests(np.asarray(p_values, float), method="holm")[1]
+    adjusted: Floats = multipletests(_floats(p_values), method="holm")[1]
     return adjusted
 
 
@@ -166,7 +165,8 @@ def trials_needed(effect: float, variation: float, power: float = 0.8, alpha: fl
     (26, 100)
     """
     size = effect / variation
-    return math.ceil(TTestIndPower().solve_power(effect_size=size, power=power, alpha=alpha))
+    trials: float = TTestIndPower().solve_power(effect_size=size, power=power, alpha=alpha)
+    return math.ceil(trials)
 
 
 def detectable_effect(
@@ -183,8 +183,8 @@ def detectable_effect(
 
 def _per_cluster(values: ArrayLike, clusters: ArrayLike) -> tuple[Floats, Floats]:
     _, cluster = np.unique(np.asarray(clusters), return_inverse=True)
-    sums = np.bincount(cluster, weights=np.asarray(values, float))
-    return sums, np.bincount(cluster).astype(float)
+    sums = _floats(np.bincount(cluster, weights=_floats(values)))
+    return sums, np.bincount(cluster).astype(np.float64)
 
 
 def _percentiles(values: Floats, confidence: float) -> tuple[float, float]:
@@ -193,4 +193,8 @@ def _percentiles(values: Floats, confidence: float) -> tuple[float, float]:
 
 
 def _censored(times: ArrayLike, reached: ArrayLike) -> stats.CensoredData:
-    return stats.CensoredData.right_censored(np.asarray(times, float), ~np.asarray(reached, bool))
+    return stats.CensoredData.right_censored(_floats(times), ~np.asarray(reached, bool))
+
+
+def _floats(values: ArrayLike) -> Floats:
+    return np.asarray(values, dtype=np.float64)

@@ -1,0 +1,126 @@
+"""The behaviour transfer function rho: what was learned on a source task as a start for a target.
+
+A target tile takes the weight that the source has for the same represented value: of the source
+state variable and action that the inter-task mapping names, the tile whose centre is nearest to
+the target tile's centre (Taylor & Stone 2004; with the averaging step it is rho_CMAC of Taylor,
+Stone & Liu, JMLR 8, 2007). Between equal tile widths that is the tile of the same number. Between
+unequal ones the 32 active tiles of a value take weights from around the same value, spread over
+the target's width instead of the source's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keepaway_agent.cmac import NUM_TILINGS, Tiling
+from keepaway_transfer.errors import MappingError
+from keepaway_transfer.mapping import MAPPING_RULES, InterTaskMapping, actions, state_variables
+
+Weights = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A way to carry weights over: the rule of its mapping and what is done to the weights."""
+
+    rule: str  # of MAPPING_RULES
+    averaged: bool = False  # weights still zero take the mean of the others
+    rescaled: bool = False  # action values keep the scale they have in the source task
+
+
+VARIANTS = {
+    "rho": Variant("rho"),  # the paper's
+    "rho_modified": Variant("rho_modified"),  # its sensitivity test
+    "rho_averaged": Variant("rho", averaged=True),  # Taylor, Stone & Liu 2007
+    "rescaled": Variant("rho", rescaled=True),
+    "partial": Variant("partial"),
+    "shuffled": Variant("shuffled"),  # a negative control
+}
+
+
+def rho(
+    weights: Weights,
+    source: Tiling,
+    target: Tiling,
+    mapping: InterTaskMapping,
+    *,
+    averaged: bool = False,
+    rescaled: bool = False,
+) -> Weights:
+    """Weights for the target task from those of a keeper of the source task.
+
+    Args:
+        weights: (num_actions, num_features, num_tiles, num_tilings) of the source.
+        source: how the source's state variables are tiled.
+        target: how the target's are.
+        mapping: which source variable and action stand for each of the target.
+        averaged: let every weight that is still zero take the mean of the non-zero ones.
+        rescaled: multiply by the number of source variables over that of mapped target variables,
+            because an action's value is a sum over state variables.
+
+    Returns:
+        (num_actions, num_features, num_tiles, num_tilings) of the target.
+
+    Raises:
+        MappingError: weights or tilings that are not of the mapping's tasks.
+    """
+    _check_tasks(weights, source, target, mapping)
+    known = weights.reshape(*weights.shape[:2], -1)
+    carried = np.zeros(target.weights_shape(len(mapping.chi_a)))
+    flat = carried.reshape(*carried.shape[:2], -1)
+    for variable, of_source in enumerate(mapping.variable_indices):
+        tiles = nearest_tiles(source, of_source, target, variable)
+        for action, source_action in enumerate(mapping.action_indices):
+            if of_source >= 0 and source_action >= 0:
+                flat[action, variable] = known[source_action, of_source, tiles]
+    if rescaled:
+        carried *= source.num_features / sum(index >= 0 for index in mapping.variable_indices)
+    if averaged and carried.any():
+        carried[carried == 0] = carried[carried != 0].mean()
+    return carried
+
+
+def nearest_tiles(
+    source: Tiling, source_variable: int, target: Tiling, target_variable: int
+) -> NDArray[np.int64]:
+    """For each flat tile of a target variable the source tile with the nearest centre.
+
+    Flat tile j = tile * 32 + tiling reaches over the 32 fine cells j-31 .. j, so its centre lies
+    (j - 15) / 32 widths above the variable's low end. Centres off the source's tiles take its
+    first or last tile.
+
+    Returns:
+        (num_tiles * num_tilings of the target,) flat source tiles.
+    """
+    middle = NUM_TILINGS // 2 - 1
+    tiles = np.arange(target.num_tiles * NUM_TILINGS)
+    cell = target.widths[target_variable] / NUM_TILINGS
+    centres = target.lows[target_variable] + (tiles - middle) * cell  # [m or rad]
+    source_cell = source.widths[source_variable] / NUM_TILINGS
+    nearest = np.rint((centres - source.lows[source_variable]) / source_cell) + middle
+    return np.clip(nearest, 0, source.num_tiles * NUM_TILINGS - 1).astype(np.int64)
+
+
+def variant_mapping(
+    variant: str, source_task: str, target_task: str, generator: np.random.Generator
+) -> InterTaskMapping:
+    """The mapping that a variant uses between two tasks; `generator` deals out the shuffled one."""
+    if variant not in VARIANTS:
+        raise MappingError(f"variant={variant!r}: choose one of {', '.join(VARIANTS)}")
+    return MAPPING_RULES[VARIANTS[variant].rule](source_task, target_task, generator)
+
+
+def _check_tasks(
+    weights: Weights, source: Tiling, target: Tiling, mapping: InterTaskMapping
+) -> None:
+    expected = source.weights_shape(len(actions(mapping.source)))
+    if weights.shape != expected:
+        raise MappingError(
+            f"weights of shape {weights.shape} where {mapping.source} has {expected}"
+        )
+    for tiling, task in ((source, mapping.source), (target, mapping.target)):
+        if tiling.feature_names != state_variables(task):
+            raise MappingError(
+                f"not the tiling of a keeper in {task}: it has {', '.join(tiling.feature_names)}"
+            )
