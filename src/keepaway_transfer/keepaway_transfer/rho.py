@@ -99,7 +99,7 @@ def nearest_tiles(
     centres = target.lows[target_variable] + (tiles - middle) * cell  # [m or rad]
     source_cell = source.widths[source_variable] / NUM_TILINGS
     nearest = np.rint((centres - source.lows[source_variable]) / source_cell) + middle
-    return np.clip(nearest, 0, source.num_tiles * NUM_TILINGS - 1).astype(np.int64)
+    return np.asarray(np.clip(nearest, 0, source.num_tiles * NUM_TILINGS - 1), dtype=np.int64)
 
 
 def variant_mapping(
