@@ -1,0 +1,75 @@
+"""The same tree builds with colcon, as people with an ordinary ROS 2 build it, and runs from there."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+EXECUTABLES = {
+    "keepaway_sim": {"simulator", "recorder", "replayer"},
+    "keepaway_agent": {"keeper", "taker"},
+    "keepaway_transfer": {"transfer"},
+}
+
+
+class Workspace(NamedTuple):
+    """A folder that colcon has built into."""
+
+    install: Path
+
+    def run(self, command: str) -> str:
+        """What a shell command prints after the workspace's set-up script was sourced."""
+        shell = ["bash", "-c", f"source {self.install}/setup.bash && {command}"]
+        return subprocess.run(shell, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(scope="module")
+def workspace(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
+    """The tree built against the wheels: only the two CMake arguments are not an ordinary ROS 2's."""
+    folder = tmp_path_factory.mktemp("colcon")
+    arguments = [
+        *("--log-base", folder / "log", "build", "--executor", "sequential"),
+        *("--base-paths", root, "--build-base", folder / "build"),
+        *("--install-base", folder / "install"),
+        "--cmake-args",
+        f"-DCMAKE_PROJECT_INCLUDE={root}/msgs/cmake/wheel_prefix.cmake",
+        f"-DPython3_EXECUTABLE={sys.executable}",
+    ]
+    wheels = {"CMAKE_PREFIX_PATH": sys.prefix, "AMENT_PREFIX_PATH": sys.prefix}
+    built = subprocess.run(
+        [sys.executable, "-m", "colcon", *arguments],
+        env=os.environ | wheels,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    yield Workspace(folder / "install")
+
+
+@pytest.mark.parametrize("package", EXECUTABLES)
+def test_ros2_run_finds_every_node(workspace: Workspace, package: str) -> None:
+    folder = workspace.install / package / "lib" / package
+    assert {path.name for path in folder.iterdir()} == EXECUTABLES[package]
+
+
+def test_ros2_launch_finds_the_match(workspace: Workspace) -> None:
+    share = workspace.install / "keepaway_sim" / "share" / "keepaway_sim"
+    assert (share / "launch" / "match.launch.py").is_file()
+
+
+@pytest.mark.parametrize("package", ["keepaway_msgs", *EXECUTABLES])
+def test_package_is_indexed_and_imported_from_the_workspace(
+    workspace: Workspace, package: str
+) -> None:
+    program = (
+        f"import {package}, ament_index_python as index;"
+        f"print({package}.__file__, index.get_package_prefix('{package}'))"
+    )
+    imported, prefix = workspace.run(f'{sys.executable} -c "{program}"').split()
+    assert Path(imported).is_relative_to(workspace.install)
+    assert Path(prefix) == workspace.install / package
