@@ -1,0 +1,60 @@
+"""Plane geometry and geometric series for compiled code. Angles in radians, lengths in metres."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+TWO_PI = 2.0 * math.pi
+
+
+@njit(cache=True, inline="always")
+def wrap(angle):
+    """The same angle in [-pi, pi].
+
+    >>> round(wrap(3.5 * math.pi) / math.pi, 12)
+    -0.5
+    """
+    return angle - TWO_PI * round(angle / TWO_PI)
+
+
+@njit(cache=True, inline="always")
+def clip(value, low, high):
+    """`value`, but no less than `low` and no more than `high`."""
+    return low if value < low else (high if value > high else value)
+
+
+@njit(cache=True, inline="always")
+def quantize(value, step):
+    """`value` rounded to the nearest multiple of `step`; unchanged where step is 0."""
+    return value if step == 0.0 else round(value / step) * step
+
+
+@njit(cache=True, inline="always")
+def rolling(decay, cycles):
+    """Distance over first speed of what rolls for `cycles` with its speed decaying each cycle.
+
+    >>> round(rolling(0.94, 2), 12)
+    1.94
+    """
+    return (1.0 - decay**cycles) / (1.0 - decay)
+
+
+@njit(cache=True)
+def cone_contains(x, y, start_x, start_y, end_x, end_y, width):
+    """Is (x, y) in the cone from start to end that is `width` wide (half) at distance 1?
+
+    The cone ends at `end`, and a point further from start than `end` is outside
+    (P: WorldModel::getNrInSetInCone).
+    """
+    axis_x, axis_y = end_x - start_x, end_y - start_y
+    point_x, point_y = x - start_x, y - start_y
+    square = axis_x * axis_x + axis_y * axis_y
+    along = axis_x * point_x + axis_y * point_y
+    if along <= 0.0 or along >= square:
+        return False
+    if point_x * point_x + point_y * point_y >= square:
+        return False
+    across = axis_x * point_y - axis_y * point_x
+    return abs(across) < width * along

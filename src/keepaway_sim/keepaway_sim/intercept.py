@@ -1,0 +1,186 @@
+"""Predictions of a player's own and others' movement: who reaches the ball when, and how.
+
+Source: P WorldModelPredict.cc. Simplified: the meeting point is the first one in reach, or one
+of the next two if it is the point already chosen (P looks twenty cycles further for it).
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from keepaway_sim.config import NEVER
+from keepaway_sim.geometry import clip, rolling, wrap
+
+LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
+SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
+SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
+MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
+
+
+@njit(cache=True, inline="always")
+def dash_power(c, along, speed_along, cycles):
+    """Power of the dash that covers `along` metres ahead in `cycles` (P: getPowerForDash)."""
+    wanted = min(along / rolling(c.player_decay, cycles), c.player_speed_max)
+    return clip((wanted - speed_along) / c.dash_power_rate, -100.0, 100.0)
+
+
+@njit(cache=True, inline="always")
+def turn_moment(c, angle, speed):
+    """Moment to send so that a player at `speed` turns by `angle` (P: getAngleForTurn)."""
+    return clip(angle * (1.0 + c.inertia_moment * speed), -math.pi, math.pi)
+
+
+@njit(cache=True)
+def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
+    """Moment of the turn needed before running to a point; 0.0 if none is.
+
+    A player turns while the point lies off the line of its body, or behind it and further than
+    `back_distance` (P: predictCommandTurnTowards).
+    """
+    roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
+    rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
+    away = math.hypot(to_x - x, to_y - y)
+    ratio = 3.0 if away > 20.0 else (2.0 if away > 10.0 else 0.9)
+    allowed = ratio * c.kickable_distance
+    rest = math.hypot(rel_x, rel_y)
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    if not _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
+        return 0.0
+    angle = wrap(math.atan2(rel_y, rel_x) - yaw)
+    speed = math.hypot(vx, vy)
+    moment = turn_moment(c, angle, speed)
+    if cycles < 4 and rest < back_distance:
+        reached = yaw + moment / (1.0 + c.inertia_moment * speed)
+        cosine, sine = math.cos(reached), math.sin(reached)
+        if _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
+            back = turn_moment(c, wrap(angle + math.pi), speed)
+            reached = yaw + back / (1.0 + c.inertia_moment * speed)
+            across = abs(math.cos(reached) * rel_y - math.sin(reached) * rel_x)
+            if across < 0.9 * c.kickable_distance:
+                return back
+    return moment
+
+
+@njit(cache=True, inline="always")
+def _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
+    across = abs(cosine * rel_y - sine * rel_x)
+    behind = cosine * rel_x + sine * rel_y < 0.0
+    return across > allowed or (behind and rest > back_distance)
+
+
+@njit(cache=True)
+def reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
+    """Distance to a point that is left after `cycles` of going there (P: intercept loop)."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turning = True
+    for k in range(cycles):
+        left = cycles - k
+        power = 0.0
+        if turning:
+            moment = turn_to_go(
+                c, x, y, vx, vy, yaw, to_x, to_y, left, c.back_dash_distance
+            )
+            if moment != 0.0:
+                yaw += moment / (1.0 + c.inertia_moment * math.hypot(vx, vy))
+                cosine, sine = math.cos(yaw), math.sin(yaw)
+            else:
+                turning = False
+        if not turning:
+            along = cosine * (to_x - x) + sine * (to_y - y)
+            power = dash_power(c, along, cosine * vx + sine * vy, left)
+            vx += c.dash_power_rate * power * cosine
+            vy += c.dash_power_rate * power * sine
+            speed = math.hypot(vx, vy)
+            if speed > c.player_speed_max:
+                vx *= c.player_speed_max / speed
+                vy *= c.player_speed_max / speed
+        x, y = x + vx, y + vy
+        vx, vy = c.player_decay * vx, c.player_decay * vy
+    return math.hypot(to_x - x, to_y - y)
+
+
+@njit(cache=True)
+def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
+    """Cycles until a player can meet the ball, and where.
+
+    Args:
+        ball, ball_v: (2,) believed position [m] and velocity [m/cycle].
+        old_x, old_y, has_old: the meeting point chosen in the last cycles, if any.
+
+    Returns:
+        cycles (NEVER if not within the horizon), x, y of the ball then.
+    """
+    first = NEVER
+    first_x, first_y = ball[0], ball[1]
+    bx, by = ball[0], ball[1]
+    wx, wy = ball_v[0], ball_v[1]
+    for i in range(c.intercept_horizon + 1):
+        roll = rolling(c.player_decay, min(i, LOOK_AHEAD))
+        rest = math.hypot(bx - x - roll * vx, by - y - roll * vy)
+        if rest / c.player_speed_max <= i + c.kickable_distance:
+            left = reach_after(c, x, y, vx, vy, yaw, bx, by, i)
+            if left < c.kickable_distance:
+                if first == NEVER:
+                    first, first_x, first_y = i, bx, by
+                    if not has_old or math.hypot(wx, wy) <= MOVING_BALL:
+                        break
+                near_old = math.hypot(bx - old_x, by - old_y) < SAME_POINT
+                if near_old and left < SAFE_SHARE * c.kickable_distance:
+                    return i, bx, by
+        if first != NEVER and i >= first + 2:
+            break
+        bx, by = bx + wx, by + wy
+        wx, wy = c.ball_decay * wx, c.ball_decay * wy
+    return first, first_x, first_y
+
+
+@njit(cache=True)
+def run_cycles(c, distance, speed):
+    """Full dashes needed to cover `distance` metres from `speed` m/cycle straight ahead."""
+    cycles = 0
+    while distance > c.kickable_distance and cycles < 60:
+        speed = min(speed + 100.0 * c.dash_power_rate, c.player_speed_max)
+        distance -= speed
+        speed *= c.player_decay
+        cycles += 1
+    return cycles
+
+
+@njit(cache=True)
+def cycles_to_point(c, x, y, vx, vy, yaw, to_x, to_y):
+    """Cycles a player needs to bring a point within kicking distance (turns included)."""
+    cycles = 0
+    for _ in range(5):
+        if math.hypot(to_x - x, to_y - y) < c.kickable_distance:
+            return cycles
+        moment = turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, 1, c.back_dash_distance)
+        if moment == 0.0:
+            break
+        yaw += moment / (1.0 + c.inertia_moment * math.hypot(vx, vy))
+        x, y = x + vx, y + vy
+        vx, vy = c.player_decay * vx, c.player_decay * vy
+        cycles += 1
+    speed = math.cos(yaw) * vx + math.sin(yaw) * vy
+    return cycles + run_cycles(c, math.hypot(to_x - x, to_y - y), speed)
+
+
+@njit(cache=True)
+def cycles_to_ball(c, x, y, vx, vy, yaw, ball, ball_v):
+    """Cycles a player needs to reach the moving ball; NEVER beyond the horizon.
+
+    The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
+    (P: getFastestInSetTo).
+    """
+    bx, by = ball[0], ball[1]
+    wx, wy = ball_v[0], ball_v[1]
+    still = math.hypot(wx, wy) < 0.01
+    for i in range(2 * c.intercept_horizon):
+        if math.hypot(bx - x, by - y) / c.player_speed_max < i + 1:
+            needed = cycles_to_point(c, x, y, vx, vy, yaw, bx, by)
+            if needed <= i or still:
+                return needed
+        bx, by = bx + wx, by + wy
+        wx, wy = c.ball_decay * wx, c.ball_decay * wy
+    return NEVER

@@ -1,0 +1,32 @@
+"""The version of the code that made a result, with the git commit where there is one."""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+from pathlib import Path
+
+__version__ = "0.1.0"
+
+
+@functools.cache
+def code_version() -> str:
+    """For example "0.1.0+g1a2b3c4" in a checkout, "0.1.0+g1a2b3c4.dirty" with changes in src."""
+    here = Path(__file__).resolve().parent
+    try:
+        commit = _git(here, "rev-parse", "--short", "HEAD")
+        dirty = _git(here, "status", "--porcelain", "--untracked-files=no", "--", "../..")
+    except (OSError, subprocess.CalledProcessError, subprocess.TimeoutExpired):
+        return __version__
+    return f"{__version__}+g{commit}{'.dirty' if dirty else ''}"
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        ["git", "-C", str(folder), *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=10,
+    )
+    return done.stdout.strip()

@@ -1,0 +1,388 @@
+"""World: any number of independent keepaway fields, stepped together, one 0.1 s cycle a call.
+
+A field's result depends on its own seed only, never on which fields run beside it. The simulator
+node plays a World of one field, the trainer Worlds of hundreds; there is no other code path.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from keepaway_sim import physics, referee, skills, vision
+from keepaway_sim.config import NEVER, Config, pack
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.geometry import TWO_PI
+from keepaway_sim.intercept import cycles_to_ball
+from keepaway_sim.streams import RandomStreams, draw
+from keepaway_sim.task import Action, Outcome, Task
+
+
+class State(NamedTuple):
+    """The truth of every field; the ball is the last object."""
+
+    position: np.ndarray  # (F, P + 1, 2) [m]
+    velocity: np.ndarray  # (F, P + 1, 2) [m/cycle], after decay
+    yaw: np.ndarray  # (F, P) [rad] body directions
+    action: np.ndarray  # (F, P) int64, the action in force
+    target: np.ndarray  # (F, P) int64, its receiver or marked keeper
+    take_count: np.ndarray  # (F,) int64, the referee's counter
+    last_keeper: np.ndarray  # (F,) int64, keeper that controlled the ball last; -1 none
+    time: np.ndarray  # (F,) int64 [cycles] since the field was started
+    running: np.ndarray  # (F,) bool: started and not stopped
+
+
+class World:
+    """`num_fields` keepaway fields in lock-step.
+
+    Attributes:
+        task, config: what is played and how.
+        perceptions: what every player believes (`vision.Perceptions`), updated in place.
+        state: the truth (`State`), updated in place.
+    """
+
+    def __init__(self, task: Task, config: Config, num_fields: int = 1) -> None:
+        """Lay out the fields; each is idle until `start` gives it a seed.
+
+        Raises:
+            KeepawayError: `num_fields` is not positive.
+        """
+        if num_fields < 1:
+            raise KeepawayError(f"num_fields={num_fields}: give at least 1")
+        self.task, self.config, self.num_fields = task, config, num_fields
+        num = task.num_players
+        self._constants = pack(task, config)
+        self.perceptions = vision.make_perceptions(num_fields, num)
+        self._memory = vision.make_memory(num_fields, num)
+        self._speech = vision.make_speech(num_fields, num)
+        self.state = _make_state(num_fields, num)
+        self._radius = np.full(num + 1, config.physics.player_size)
+        self._radius[num] = config.physics.ball_size
+        side = max(task.field_length, task.field_width)
+        self._bodies = physics.Bodies(num_fields, self._radius, side)
+        self._streams = RandomStreams(num_fields, reserve=num * (num + 12) + 16)
+        self._touched = np.zeros(num_fields, dtype=np.bool_)
+
+    def start(self, field: int, seed: np.random.SeedSequence) -> None:
+        """Give a field a fresh trial with its own random numbers, and kick off.
+
+        Raises:
+            KeepawayError: no such field.
+        """
+        if not 0 <= field < self.num_fields:
+            raise KeepawayError(f"field={field}: this world has fields 0..{self.num_fields - 1}")
+        self._streams.seed(field, np.random.default_rng(seed))
+        _start(
+            self._constants,
+            self.state,
+            self.perceptions,
+            self._memory,
+            self._speech,
+            self._streams.uniforms,
+            self._streams.cursor,
+            field,
+        )
+
+    def stop(self, field: int) -> None:
+        """Let a field rest: it is not simulated until it is started again."""
+        self.state.running[field] = False
+        self.perceptions.decision_due[field] = False
+        self._bodies.motion[field, :, 2:] = 0.0
+
+    def abort(self, field: int) -> None:
+        """End a field's episode from outside; its next step kicks off a new one."""
+        self.perceptions.outcome[field] = Outcome.ABORTED
+        self.perceptions.decision_due[field] = False
+
+    def step(self, action: np.ndarray, target: np.ndarray) -> None:
+        """Play one cycle on every running field.
+
+        Where a decision is due the request comes into force; elsewhere the last one holds. A
+        field whose episode ended kicks off the next one instead.
+
+        Args:
+            action, target: (num_fields, num_players) int64; `target` is the receiving or the
+                marked keeper's index, ignored for other actions.
+
+        Raises:
+            KeepawayError: a request that its player cannot carry out; nothing was played.
+        """
+        illegal = _first_illegal(
+            self._constants, self.state, self.perceptions, action, target
+        )
+        if illegal >= 0:
+            self._refuse(illegal, action, target)
+        self._streams.refill()
+        random = self._streams.uniforms, self._streams.cursor
+        _act(
+            self._constants,
+            self.state,
+            self.perceptions,
+            self._memory,
+            self._speech,
+            self._bodies.motion,
+            self._bodies.place,
+            action,
+            target,
+            *random,
+        )
+        touched = self._bodies.move()
+        self._touched[:] = False
+        self._touched[touched] = True
+        _settle(
+            self._constants,
+            self.state,
+            self.perceptions,
+            self._memory,
+            self._speech,
+            self._bodies.motion,
+            self._bodies.place,
+            self._radius,
+            self._touched,
+            *random,
+        )
+
+    def _refuse(self, illegal: int, action: np.ndarray, target: np.ndarray) -> None:
+        field, player = divmod(illegal, self.task.num_players)
+        name = self.task.player_names[player]
+        raise KeepawayError(
+            f"{name} on field {field} cannot carry out action={action[field, player]}"
+            f" target={target[field, player]}: keepers hold, pass to another keeper, get open"
+            " or go to the ball; takers go to the ball or mark a keeper"
+        )
+
+
+def _make_state(num_fields: int, num_players: int) -> State:
+    return State(
+        position=np.zeros((num_fields, num_players + 1, 2)),
+        velocity=np.zeros((num_fields, num_players + 1, 2)),
+        yaw=np.zeros((num_fields, num_players)),
+        action=np.zeros((num_fields, num_players), dtype=np.int64),
+        target=np.zeros((num_fields, num_players), dtype=np.int64),
+        take_count=np.zeros(num_fields, dtype=np.int64),
+        last_keeper=np.full(num_fields, -1, dtype=np.int64),
+        time=np.zeros(num_fields, dtype=np.int64),
+        running=np.zeros(num_fields, dtype=np.bool_),
+    )
+
+
+_HOLD = int(Action.HOLD_BALL)
+_PASS = int(Action.PASS_BALL)
+_OPEN = int(Action.GET_OPEN)
+_GO = int(Action.GO_TO_BALL)
+_MARK = int(Action.MARK_KEEPER)
+_IN_PLAY = int(Outcome.IN_PLAY)
+
+
+@njit(cache=True)
+def is_legal(c, player, action, target):
+    """Can this player carry out this request?"""
+    if player >= c.num_keepers:
+        return action == _GO or (action == _MARK and 0 <= target < c.num_keepers)
+    if action == _PASS:
+        return 0 <= target < c.num_keepers and target != player
+    return action == _HOLD or action == _OPEN or action == _GO
+
+
+@njit(cache=True)
+def _first_illegal(c, state, s, action, target):
+    num = c.num_keepers + c.num_takers
+    for f in range(len(state.running)):
+        for p in range(num):
+            if s.decision_due[f, p] and not is_legal(c, p, action[f, p], target[f, p]):
+                return f * num + p
+    return -1
+
+
+@njit(cache=True)
+def _start(c, state, s, m, speech, uniforms, cursor, f):
+    """First kick-off of a trial: nothing of an earlier one remains."""
+    for p in range(c.num_keepers + c.num_takers):
+        state.yaw[f, p] = TWO_PI * (draw(uniforms, cursor, f) - 0.5)
+        s.body[f, p, :] = state.yaw[f, p]
+        s.neck[f, p] = 0.0
+        s.position[f, p, :, :] = 0.0
+    m.self_error[f, :, :] = 0.0
+    state.time[f] = 0
+    state.running[f] = True
+    s.episode[f] = -1
+    _kick_off(c, state, s, m, speech, uniforms, cursor, f)
+
+
+@njit(cache=True)
+def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
+    referee.kick_off(c, state.position[f], state.velocity[f], uniforms, cursor, f)
+    state.take_count[f] = 0
+    state.last_keeper[f] = -1
+    s.outcome[f] = _IN_PLAY
+    s.episode[f] += 1
+    s.cycle[f] = 0
+    for p in range(c.num_keepers + c.num_takers):
+        state.action[f, p] = _OPEN if p < c.num_keepers else _GO
+        state.target[f, p] = 0
+        vision.forget(c, s, m, f, p, uniforms, cursor)
+        speech.ball_age[f, p] = -1
+        speech.opponent[f, p] = -1
+        speech.own_said[f, p] = False
+    _perceive(c, state, s, m, speech, uniforms, cursor, f)
+
+
+@njit(cache=True)
+def _act(c, state, s, m, speech, motion, place, action, target, uniforms, cursor):
+    """Requests become commands, commands become this cycle's velocities."""
+    num = c.num_keepers + c.num_takers
+    acceleration = np.zeros((num + 1, 2))
+    for f in range(len(state.running)):
+        if not state.running[f] or s.outcome[f] != _IN_PLAY:
+            motion[f, :, 2:] = 0.0
+            continue
+        acceleration[:] = 0.0
+        for p in range(num):
+            _take_request(c, state, s, m, f, p, action[f, p], target[f, p])
+            _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor)
+        for o in range(num + 1):
+            vx, vy = _velocity(c, state, acceleration, f, o, uniforms, cursor)
+            state.velocity[f, o, 0], state.velocity[f, o, 1] = vx, vy
+            motion[f, o, 0] = state.position[f, o, 0] + place[f, 0]
+            motion[f, o, 1] = state.position[f, o, 1] + place[f, 1]
+            motion[f, o, 2], motion[f, o, 3] = vx, vy
+
+
+@njit(cache=True)
+def _take_request(c, state, s, m, f, p, action, target):
+    if not s.decision_due[f, p]:
+        return
+    state.action[f, p], state.target[f, p] = action, target
+    if action == _PASS and s.ball_kickable[f, p]:
+        m.pass_cycle[f, p] = s.cycle[f]
+
+
+@njit(cache=True)
+def _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor):
+    """Player p's command: what p expects of it, says of it, and what the server does with it."""
+    kind, power, angle = skills.command(
+        c, s, m, f, p, state.action[f, p], state.target[f, p]
+    )
+    m.command[f, p, 0], m.command[f, p, 1], m.command[f, p, 2] = kind, power, angle
+    m.turned[f, p] = skills.expected_turn(c, s, f, p, kind, angle)
+    m.kicked[f, p] = False
+    if c.hearing:
+        vision.speak(c, s, speech, m, f, p, kind == skills.KICK)
+    yaw = state.yaw[f, p]
+    if kind == skills.DASH:
+        ax, ay = physics.dash_acceleration(c, power, yaw)
+        acceleration[p, 0] += ax
+        acceleration[p, 1] += ay
+    elif kind == skills.TURN:
+        noise = 2.0 * draw(uniforms, cursor, f) - 1.0 if c.turn_noise else 0.0
+        speed = math.hypot(state.velocity[f, p, 0], state.velocity[f, p, 1])
+        state.yaw[f, p] = physics.turned_yaw(c, yaw, angle, speed, noise)
+    elif kind == skills.KICK:
+        _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor)
+
+
+@njit(cache=True)
+def _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor):
+    ball = c.num_keepers + c.num_takers
+    rel_x = state.position[f, ball, 0] - state.position[f, p, 0]
+    rel_y = state.position[f, ball, 1] - state.position[f, p, 1]
+    if math.hypot(rel_x, rel_y) > c.kickable_distance:
+        return
+    m.kicked[f, p] = True
+    yaw = state.yaw[f, p]
+    ax, ay = physics.kick_acceleration(c, power, angle, rel_x, rel_y, yaw)
+    acceleration[ball, 0] += ax
+    acceleration[ball, 1] += ay
+    if c.kick_rand > 0.0:
+        speed = math.hypot(state.velocity[f, ball, 0], state.velocity[f, ball, 1])
+        largest = physics.kick_noise_radius(c, power, rel_x, rel_y, yaw, speed)
+        radius = largest * draw(uniforms, cursor, f)
+        direction = TWO_PI * draw(uniforms, cursor, f)
+        acceleration[ball, 0] += radius * math.cos(direction)
+        acceleration[ball, 1] += radius * math.sin(direction)
+
+
+@njit(cache=True)
+def _velocity(c, state, acceleration, f, o, uniforms, cursor):
+    vx, vy = state.velocity[f, o]
+    ax, ay = acceleration[o]
+    if o == c.num_keepers + c.num_takers:
+        rand = c.ball_rand if c.movement_noise else 0.0
+        return physics.moved_velocity(
+            vx, vy, ax, ay, c.ball_accel_max, c.ball_speed_max, rand, uniforms, cursor, f
+        )
+    rand = c.player_rand if c.movement_noise else 0.0
+    return physics.moved_velocity(
+        vx, vy, ax, ay, c.player_accel_max, c.player_speed_max, rand, uniforms, cursor, f
+    )
+
+
+@njit(cache=True)
+def _settle(c, state, s, m, speech, motion, place, radius, touched, uniforms, cursor):
+    """After the discs moved: collisions, referee, and what the players perceive of it."""
+    num = c.num_keepers + c.num_takers
+    for f in range(len(state.running)):
+        if not state.running[f]:
+            continue
+        state.time[f] += 1
+        if s.outcome[f] != _IN_PLAY:
+            _kick_off(c, state, s, m, speech, uniforms, cursor, f)
+            continue
+        for o in range(num + 1):
+            decay = c.ball_decay if o == num else c.player_decay
+            for axis in range(2):
+                state.position[f, o, axis] = motion[f, o, axis] - place[f, axis]
+                state.velocity[f, o, axis] = physics.on_grid(decay * state.velocity[f, o, axis])
+        if touched[f]:
+            physics.separate(state.position[f], state.velocity[f], radius)
+        s.cycle[f] += 1
+        keeper = referee.near_ball(c, state.position[f], 0, c.num_keepers)
+        taker = referee.near_ball(c, state.position[f], c.num_keepers, num)
+        if keeper >= 0:
+            state.last_keeper[f] = keeper
+        state.take_count[f] = referee.next_take_count(
+            state.take_count[f], keeper >= 0, taker >= 0
+        )
+        s.outcome[f] = referee.outcome(c, state.position[f], state.take_count[f])
+        _perceive(c, state, s, m, speech, uniforms, cursor, f)
+
+
+@njit(cache=True)
+def _perceive(c, state, s, m, speech, uniforms, cursor, f):
+    position, velocity, yaw = state.position[f], state.velocity[f], state.yaw[f]
+    for p in range(c.num_keepers + c.num_takers):
+        if s.cycle[f] > 0:
+            vision.remember(c, s, m, f, p)
+        vision.feel_self(c, s, m, position, velocity, f, p)
+        if c.hearing:
+            vision.hear(c, s, speech, f, p, uniforms, cursor)
+        if vision.looks_now(c, m, f, p, state.time[f]):
+            vision.look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor)
+        _judge(c, s, m, f, p)
+
+
+@njit(cache=True)
+def _judge(c, s, m, f, p):
+    """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
+    num = c.num_keepers + c.num_takers
+    ball, ball_v = s.position[f, p, num], s.velocity[f, p, num]
+    known = s.age[f, p, num] <= c.ball_lost_age
+    own = s.position[f, p, p]
+    near = math.hypot(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
+    s.ball_kickable[f, p] = known and near
+    s.cycles_to_ball[f, p, :] = NEVER
+    if s.ball_kickable[f, p]:
+        s.cycles_to_ball[f, p, p] = 0
+    elif known and p < c.num_keepers:
+        for j in range(c.num_keepers):
+            if j == p or s.age[f, p, j] <= c.player_lost_age:
+                x, y = s.position[f, p, j]
+                vx, vy = s.velocity[f, p, j]
+                s.cycles_to_ball[f, p, j] = cycles_to_ball(
+                    c, x, y, vx, vy, s.body[f, p, j], ball, ball_v
+                )
+    passing = m.pass_cycle[f, p] == s.cycle[f] - 1 and s.ball_kickable[f, p]
+    s.decision_due[f, p] = s.outcome[f] == _IN_PLAY and not passing
