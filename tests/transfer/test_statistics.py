@@ -69,6 +69,20 @@ def test_values_without_spread_have_a_point_for_an_interval(generator):
     assert statistics.bootstrap_mean([3.0, 3.0], generator) == (3.0, 3.0, 3.0)
 
 
+def test_the_mean_curve_has_students_interval_at_each_point():
+    # Values 1 and 3: mean 2, standard error 1, one degree of freedom: t = 12.706.
+    curve = statistics.mean_curve([[1.0, 5.0], [3.0, 5.0]])
+    assert curve.estimate.tolist() == [2.0, 5.0]
+    assert curve.high - curve.estimate == pytest.approx([12.706, 0.0], abs=1e-3)
+
+
+def test_the_mean_curve_ends_where_the_first_trial_stopped():
+    assert np.isnan(statistics.mean_curve([[1.0, np.nan], [3.0, 4.0]]).estimate).tolist() == [
+        False,
+        True,
+    ]
+
+
 def test_drawing_whole_clusters_widens_the_interval_when_trials_share_a_source(generator):
     by_source = np.repeat(generator.normal(0, 1, size=20), 10)  # ten equal trials a source
     sources = np.repeat(np.arange(20), 10)

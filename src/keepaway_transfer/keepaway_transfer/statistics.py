@@ -29,6 +29,14 @@ class Interval(NamedTuple):
     high: float
 
 
+class Curve(NamedTuple):
+    """An estimate and the ends of its confidence interval at each of many points."""
+
+    estimate: Floats  # (num_points,)
+    low: Floats  # (num_points,)
+    high: Floats  # (num_points,)
+
+
 class Comparison(NamedTuple):
     """Difference of two means with its confidence interval and the p-value of no difference."""
 
@@ -76,6 +84,20 @@ def bootstrap_mean(
     return Interval(
         mean, float(result.confidence_interval.low), float(result.confidence_interval.high)
     )
+
+
+def mean_curve(curves: ArrayLike, confidence: float = CONFIDENCE) -> Curve:
+    """Mean of curves, (num_trials, num_points), with Student's interval at each point.
+
+    NaN where a trial has no value: a mean over the others would be one over the slower trials,
+    because trials stop when they reach the threshold.
+    """
+    curves = _floats(curves)
+    trials = len(curves)
+    mean = curves.mean(axis=0)
+    error = curves.std(axis=0, ddof=1) / math.sqrt(trials) if trials > 1 else np.zeros_like(mean)
+    half = float(stats.t.ppf((1 + confidence) / 2, max(trials - 1, 1))) * error
+    return Curve(mean, mean - half, mean + half)
 
 
 def clustered_bootstrap(
