@@ -1,9 +1,8 @@
-"""The same tree builds with colcon, as people with an ordinary ROS 2 build it, and runs from there."""
+"""The tree builds with colcon, as people with an ordinary ROS 2 build it, and is whole there."""
 
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,8 +27,8 @@ class Workspace(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def workspace(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
-    """The tree built against the wheels: only the two CMake arguments are not an ordinary ROS 2's."""
+def workspace(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """The tree built against the wheels; an ordinary ROS 2 needs no arguments for CMake."""
     folder = tmp_path_factory.mktemp("colcon")
     arguments = [
         *("--log-base", folder / "log", "build", "--executor", "sequential"),
@@ -48,13 +47,27 @@ def workspace(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         text=True,
     )
     assert built.returncode == 0, built.stdout + built.stderr
-    yield Workspace(folder / "install")
+    return Workspace(folder / "install")
 
 
 @pytest.mark.parametrize("package", EXECUTABLES)
 def test_ros2_run_finds_every_node(workspace: Workspace, package: str) -> None:
     folder = workspace.install / package / "lib" / package
     assert {path.name for path in folder.iterdir()} == EXECUTABLES[package]
+
+
+@pytest.mark.parametrize("package", EXECUTABLES)
+def test_every_file_of_a_package_is_installed(
+    workspace: Workspace, root: Path, package: str
+) -> None:
+    source = root / "src" / package / package
+    (installed,) = (workspace.install / package).glob(f"lib/python*/site-packages/{package}")
+
+    def files(folder: Path) -> set[Path]:
+        found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+        return {path for path in found if "__pycache__" not in path.parts}
+
+    assert files(installed) == files(source)
 
 
 def test_ros2_launch_finds_the_match(workspace: Workspace) -> None:
