@@ -30,7 +30,7 @@ class Workspace(NamedTuple):
 def workspace(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The tree built against the wheels; an ordinary ROS 2 needs no arguments for CMake."""
     folder = tmp_path_factory.mktemp("colcon")
-    arguments = [
+    arguments: list[str | Path] = [
         *("--log-base", folder / "log", "build", "--executor", "sequential"),
         *("--base-paths", root, "--build-base", folder / "build"),
         *("--install-base", folder / "install"),

@@ -1,0 +1,64 @@
+"""Dependence goes one way, ROS stays in the nodes, and every module is in its package's README."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+SRC = Path(__file__).resolve().parents[2] / "src"
+MODULES = sorted(SRC.glob("keepaway_*/keepaway_*/**/*.py"))
+PACKAGES = sorted(SRC.glob("keepaway_*"))
+ALLOWED = {
+    "keepaway_sim": {"keepaway_sim"},
+    "keepaway_agent": {"keepaway_sim", "keepaway_agent"},
+    "keepaway_transfer": {"keepaway_sim", "keepaway_agent", "keepaway_transfer"},
+}
+ROS = {"rclpy", "keepaway_msgs"}
+
+
+def name_of(module: Path) -> str:
+    """A module's dotted name, from its place."""
+    return ".".join(module.relative_to(SRC).parts[1:]).removesuffix(".py")
+
+
+def imports(module: Path) -> set[str]:
+    """The dotted names of all modules that a module imports, wherever in its text."""
+    nodes = list(ast.walk(ast.parse(module.read_text())))
+    plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    froms = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+    members = {f"{node.module}.{alias.name}" for node in froms for alias in node.names}
+    return plain | members | {node.module or "" for node in froms}
+
+
+def packages(module: Path) -> set[str]:
+    """The top-level packages that a module imports."""
+    return {name.partition(".")[0] for name in imports(module)}
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_packages_depend_in_one_direction(module: Path) -> None:
+    package = name_of(module).partition(".")[0]
+    assert packages(module) & set(ALLOWED) <= ALLOWED[package]
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if "nodes" not in m.parts], ids=name_of)
+def test_pure_logic_knows_no_ros(module: Path) -> None:
+    assert not packages(module) & ROS
+    assert not [name for name in imports(module) if ".nodes" in name]
+
+
+def test_agent_nodes_import_nothing_of_the_simulator() -> None:
+    known = {name_of(module): module for module in MODULES}
+    reached: set[str] = set()
+    waiting = {name for name in known if name.startswith("keepaway_agent.nodes.")}
+    while waiting:
+        reached |= waiting
+        waiting = set().union(*(imports(known[name]) for name in waiting)) & set(known) - reached
+    assert not [name for name in reached if name.startswith("keepaway_sim")]
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda path: path.name)
+def test_every_module_is_in_the_readme_of_its_package(package: Path) -> None:
+    readme = (package / "README.md").read_text()
+    modules = {module.name for module in (package / package.name).glob("*.py")} - {"__init__.py"}
+    assert not {name for name in modules if f"| `{name}` |" not in readme}
