@@ -40,7 +40,9 @@ def test_a_figure_is_written_with_what_made_it(curve_figure, tmp_path):
 def test_time_to_threshold_draws_an_estimate_a_row():
     target = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
     total = [statistics.Interval(8, 7, 9), statistics.Interval(7, 6, 8)]
-    figure = plotting.time_to_threshold(["0", "1,000"], target, total, "4v3")
+    figure = plotting.time_to_threshold(
+        ["0", "1,000"], target, total, target[0], title="4v3", rows_are="Episodes of 3v2"
+    )
     estimates = [y.tolist() for x, y in lines(figure) if len(x) == 2]
     assert [8, 5] in estimates
     assert [8, 7] in estimates

@@ -27,6 +27,15 @@ def test_welch_on_student_sized_numbers():
     assert comparison.p_value == pytest.approx(0.1041, abs=1e-3)
 
 
+def test_values_without_spread_leave_no_doubt():
+    assert statistics.welch([9.0, 9.0], [9.0, 9.0, 9.0]) == (0.0, 0.0, 0.0, 1.0)
+    assert statistics.welch([8.0, 8.0], [9.0, 9.0]) == (-1.0, -1.0, -1.0, 0.0)
+
+
+def test_arms_that_never_reach_the_threshold_do_not_differ():
+    assert statistics.logrank([9.0, 9.0], [False, False], [9.0], [False]) == 1.0
+
+
 def test_kaplan_meier_counts_a_censored_trial_as_at_risk_until_it_stopped():
     curve = statistics.kaplan_meier(TIMES, REACHED)
     assert curve.times.tolist() == [2, 3, 5, 8]

@@ -62,21 +62,28 @@ def learning_curves(
 
 
 def time_to_threshold(
-    amounts: Sequence[str], target: Sequence[Interval], total: Sequence[Interval], title: str
+    rows: Sequence[str],
+    target: Sequence[Interval],
+    total: Sequence[Interval],
+    scratch: Interval,
+    *,
+    title: str,
+    rows_are: str,
 ) -> Figure:
-    """Hours to the threshold by amount of source training; the first amount is none at all.
+    """Hours to the threshold, row by row.
 
     Args:
-        amounts: label of each row, from none upwards.
+        rows: label of each row, in order.
         target: hours on the target task alone.
         total: hours on source and target task together.
+        scratch: hours of learning from scratch, a band across.
         title: above the axes.
+        rows_are: what the rows differ in, below the axes.
     """
-    figure, axes = _figure(title, "Source training before transfer", "Simulated hours to threshold")
-    scratch = target[0]
+    figure, axes = _figure(title, rows_are, "Simulated hours to threshold")
     axes.axhspan(scratch.low, scratch.high, color=COLOURS[0], alpha=BAND, linewidth=0)
     axes.axhline(scratch.estimate, color=COLOURS[0], linestyle=":", label="from scratch")
-    places = np.arange(len(amounts))
+    places = np.arange(len(rows))
     for label, intervals, colour, shift in (
         ("target task", target, COLOURS[1], -0.08),
         ("source + target", total, COLOURS[2], 0.08),
@@ -86,7 +93,7 @@ def time_to_threshold(
             places + shift, estimate, [estimate - low, high - estimate], color=colour,
             marker="o", markersize=5, capsize=3, linewidth=1.2, label=label,
         )  # fmt: skip
-    axes.set_xticks(places, amounts)
+    axes.set_xticks(places, rows)
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False)
     return figure

@@ -55,8 +55,14 @@ class SurvivalCurve(NamedTuple):
 
 
 def welch(first: ArrayLike, second: ArrayLike, confidence: float = CONFIDENCE) -> Comparison:
-    """Welch's t-test of mean(first) - mean(second), two-sided, variances not assumed equal."""
+    """Welch's t-test of mean(first) - mean(second), two-sided, variances not assumed equal.
+
+    Values without any spread leave no doubt: p is 1 for equal means, else 0.
+    """
     one, other = _floats(first), _floats(second)
+    if np.ptp(one) == np.ptp(other) == 0:
+        difference = float(one[0] - other[0])
+        return Comparison(difference, difference, difference, float(difference == 0))
     test = stats.ttest_ind(one, other, equal_var=False)
     low, high = test.confidence_interval(confidence)
     return Comparison(float(one.mean() - other.mean()), float(low), float(high), float(test.pvalue))
@@ -162,7 +168,12 @@ def restricted_mean(
 def logrank(
     first: ArrayLike, first_reached: ArrayLike, second: ArrayLike, second_reached: ArrayLike
 ) -> float:
-    """The p-value of the two-sided log-rank test that both arms reach the threshold alike."""
+    """The p-value of the two-sided log-rank test that both arms reach the threshold alike.
+
+    It is 1 if no trial of either did.
+    """
+    if not (np.any(first_reached) or np.any(second_reached)):
+        return 1.0
     return float(
         stats.logrank(_censored(first, first_reached), _censored(second, second_reached)).pvalue
     )
