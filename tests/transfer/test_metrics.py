@@ -64,6 +64,11 @@ def test_the_learning_curve_is_the_mean_of_the_last_episodes_that_ended():
     np.testing.assert_allclose(curve, [np.nan, 1800, 1800, 2700, np.nan])
 
 
+def test_the_learning_curve_can_wait_for_enough_episodes():
+    curve = metrics.learning_curve([1800, 1800, 3600], [0.5, 1.0, 2.0], window=3, least=2)
+    np.testing.assert_allclose(curve, [np.nan, 1800, 2400])
+
+
 def test_the_total_reward_of_a_flat_curve_is_height_times_hours():
     assert metrics.total_reward([36.0] * 200, horizon=2.0) == pytest.approx(72.0)
 

@@ -117,6 +117,10 @@ def test_trials_needed_for_the_effects_of_the_facts_page():
     assert statistics.trials_needed(effect=0.10, variation=0.25) == 100
 
 
+def test_no_test_takes_fewer_than_two_trials():
+    assert statistics.trials_needed(effect=0.10, variation=0.001) == 2
+
+
 def test_detectable_effect_inverts_trials_needed():
     assert statistics.detectable_effect(100, variation=0.25) == pytest.approx(0.10, abs=0.001)
 

@@ -68,18 +68,20 @@ def asymptotic_performance(durations: ArrayLike, window: int = WINDOW) -> float:
     return float(np.mean(np.asarray(durations, dtype=np.float64)[-window:]))
 
 
-def learning_curve(durations: ArrayLike, at_hours: ArrayLike, window: int = WINDOW) -> Floats:
+def learning_curve(
+    durations: ArrayLike, at_hours: ArrayLike, window: int = WINDOW, least: int = 1
+) -> Floats:
     """Mean duration [s] of the last `window` episodes that ended by each of `at_hours`.
 
-    At the start it is over fewer episodes; NaN before the first one ended and after the trial
-    stopped, where nothing is known.
+    At the start it is over fewer episodes, but `least`; NaN where fewer ended and after the trial
+    stopped.
     """
     durations = np.asarray(durations, dtype=np.float64)
     sums = np.concatenate([[0.0], np.cumsum(durations)])
     at_seconds = np.asarray(at_hours, dtype=np.float64) * SECONDS_PER_HOUR
     finished = np.searchsorted(sums[1:], at_seconds, side="right")
     averaged = np.minimum(finished, window)
-    known = (finished > 0) & (at_seconds <= sums[-1])
+    known = (finished >= least) & (at_seconds <= sums[-1])
     totals = sums[finished] - sums[finished - averaged]
     return np.where(known, totals / np.maximum(averaged, 1), np.nan)
 

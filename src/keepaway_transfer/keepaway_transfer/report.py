@@ -65,7 +65,7 @@ def write_report(
         folder: made if it does not exist.
         threshold: another than the study's [s].
         curves: rows whose learning curves are drawn beside those from scratch; by default the one
-            with the shortest target time.
+            with the shortest total time.
 
     Returns:
         the table.
@@ -150,9 +150,9 @@ def _csv_row(measures: TrialMeasures) -> dict[str, object]:
 
 
 def _best(rows: Sequence[RowSummary], scratch: str) -> list[str]:
-    """The row with the shortest time on the target task."""
+    """The row with the shortest total time."""
     others = [row for row in rows if row.name != scratch]
-    return [min(others, key=lambda row: row.target.estimate).name] if others else []
+    return [min(others, key=lambda row: row.total.estimate).name] if others else []
 
 
 def _figures(
@@ -228,7 +228,10 @@ def _curves(trials: Sequence[Trial], hours: metrics.Floats, window: int) -> plot
     """All trials' mean curve, and a few trials evenly spread from the fastest to the slowest."""
     ordered = sorted(trials, key=lambda trial: sum(trial.cycles))
     curves = np.array(
-        [metrics.learning_curve(seconds(trial.cycles), hours, window) for trial in ordered]
+        [
+            metrics.learning_curve(seconds(trial.cycles), hours, window, metrics.FIRST_EPISODES)
+            for trial in ordered
+        ]
     )
     shown = np.linspace(0, len(ordered) - 1, min(SHOWN_TRIALS, len(ordered))).round().astype(int)
     return plotting.CurveGroup(curves[shown], statistics.mean_curve(curves))

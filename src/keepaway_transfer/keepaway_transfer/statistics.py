@@ -197,8 +197,10 @@ def trials_needed(effect: float, variation: float, power: float = 0.8, alpha: fl
     >>> trials_needed(effect=0.20, variation=0.25), trials_needed(effect=0.10, variation=0.25)
     (26, 100)
     """
-    size = effect / variation
-    trials: float = TTestIndPower().solve_power(effect_size=size, power=power, alpha=alpha)
+    size, test = effect / variation, TTestIndPower()
+    if test.power(size, nobs1=2, alpha=alpha) >= power:
+        return 2  # a t-test takes no fewer
+    trials: float = test.solve_power(effect_size=size, power=power, alpha=alpha)
     return math.ceil(trials)
 
 
