@@ -181,22 +181,7 @@ def noiseless(config: Config) -> Config:
     return Config(config.profile, physics, vision, skills)
 
 
-def pack(task: Task, config: Config) -> Any:
-    """All constants as one named tuple that compiled functions take (angles in radians)."""
-    values: dict[str, Any] = {}
-    for group in (task, config.physics, config.vision, config.skills):
-        for entry in dataclasses.fields(group):
-            values[entry.name] = getattr(group, entry.name)
-    for name in _DEGREES:
-        values[name] = math.radians(values[name])
-    physics = config.physics
-    values["kickable_distance"] = (
-        physics.player_size + physics.ball_size + physics.kickable_margin
-    )
-    values["touch_distance"] = physics.player_size + physics.ball_size
-    return _packed_type(tuple(values))(**values)
-
-
+_GROUPS = (Task, Physics, Vision, Skills)
 _DEGREES = (
     "visible_angle",
     "direction_step",
@@ -205,13 +190,28 @@ _DEGREES = (
     "mark_turn_angle",
     "search_turn",
 )
-_PACKED: dict[tuple[str, ...], Any] = {}
+_DERIVED = ("kickable_distance", "touch_distance")
+
+# Made once, under its own name in this module: numba's cache on disk must find it again.
+Constants = namedtuple(  # type: ignore[misc]
+    "Constants",
+    [entry.name for group in _GROUPS for entry in dataclasses.fields(group)] + list(_DERIVED),
+)
 
 
-def _packed_type(names: tuple[str, ...]) -> Any:
-    if names not in _PACKED:
-        _PACKED[names] = namedtuple("Constants", names)  # type: ignore[misc]
-    return _PACKED[names]
+def pack(task: Task, config: Config) -> Constants:
+    """All constants as one named tuple that compiled functions take (angles in radians)."""
+    values: dict[str, Any] = {}
+    for group in (task, config.physics, config.vision, config.skills):
+        for entry in dataclasses.fields(group):
+            values[entry.name] = type(entry.default)(getattr(group, entry.name))
+    for name in _DEGREES:
+        values[name] = math.radians(values[name])
+    physics = config.physics
+    touch = physics.player_size + physics.ball_size
+    return Constants(
+        **values, touch_distance=touch, kickable_distance=touch + physics.kickable_margin
+    )
 
 
 def _check_numbers(group: object) -> None:
