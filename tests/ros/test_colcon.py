@@ -1,13 +1,21 @@
 """The tree builds with colcon, as people with an ordinary ROS 2 build it, and is whole there."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.wait_for_message import wait_for_message
 
+from keepaway_msgs.msg import Match
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EXECUTABLES = {
     "keepaway_sim": {"simulator", "recorder", "replayer"},
     "keepaway_agent": {"keeper", "taker"},
@@ -20,10 +28,9 @@ class Workspace(NamedTuple):
 
     install: Path
 
-    def run(self, command: str) -> str:
-        """What a shell command prints after the workspace's set-up script was sourced."""
-        shell = ["bash", "-c", f"source {self.install}/setup.bash && {command}"]
-        return subprocess.run(shell, capture_output=True, text=True, check=True).stdout
+    def shell(self, command: str) -> list[str]:
+        """A command as `ros2 run` would start it: after the workspace's set-up script."""
+        return ["bash", "-c", f"source {self.install}/setup.bash && exec {command}"]
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +90,34 @@ def test_package_is_indexed_and_imported_from_the_workspace(
         f"import {package}, ament_index_python as index;"
         f"print({package}.__file__, index.get_package_prefix('{package}'))"
     )
-    imported, prefix = workspace.run(f'{sys.executable} -c "{program}"').split()
+    command = workspace.shell(f'{sys.executable} -c "{program}"')
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    imported, prefix = said.split()
     assert Path(imported).is_relative_to(workspace.install)
     assert Path(prefix) == workspace.install / package
+
+
+def test_simulator_runs_from_the_workspace_until_it_is_interrupted(
+    workspace: Workspace, ros_domain: int
+) -> None:
+    executable = workspace.install / "keepaway_sim" / "lib" / "keepaway_sim" / "simulator"
+    simulator = subprocess.Popen(workspace.shell(f"{executable} --ros-args -p task:=4v3"))
+    try:
+        match = first_match(ros_domain)
+    finally:
+        simulator.send_signal(signal.SIGINT)
+        returned = simulator.wait(timeout=30)
+    assert (match.num_keepers, match.num_takers) == (4, 3)
+    assert returned == 0
+
+
+def first_match(domain: int) -> Match:
+    """The match that somebody in this domain says is played."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node("spectator", context=context)
+    arrived, match = wait_for_message(Match, node, "match", qos_profile=LATCHED, time_to_wait=60)
+    node.destroy_node()
+    context.shutdown()
+    assert arrived, "no match within a minute"
+    return match
