@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from keepaway_agent.actions import Role
 from keepaway_agent.cmac import Tiling, action_values, make_tiling, state_cells
+from keepaway_agent.sarsa import SarsaConfig
+from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import (
@@ -15,7 +17,7 @@ from keepaway_transfer.mapping import (
     shuffled_mapping,
     state_variables,
 )
-from keepaway_transfer.rho import VARIANTS, nearest_tiles, rho, variant_mapping
+from keepaway_transfer.rho import VARIANTS, Transfer, nearest_tiles, rho, transferred
 
 
 def tiling_of(task, profile="default"):
@@ -83,7 +85,7 @@ def test_three_values_worked_by_hand():
 @pytest.mark.parametrize("profile", ["default", "framework"])
 def test_from_a_task_to_itself_nothing_changes(variant, profile):
     weights, tiling = random_weights("3v2", profile=profile), tiling_of("3v2", profile)
-    mapping = variant_mapping(variant, "3v2", "3v2", np.random.default_rng(0))
+    mapping = Transfer("3v2", variant).mapping_from("3v2")
     same = rho(weights, tiling, tiling, mapping, rescaled=VARIANTS[variant].rescaled)
     np.testing.assert_array_equal(same, weights)
 
@@ -244,4 +246,64 @@ def test_a_tiling_of_another_task_is_refused():
 
 def test_an_unknown_variant_is_refused_with_those_there_are():
     with pytest.raises(MappingError, match="choose one of rho, rho_modified"):
-        variant_mapping("rho2", "3v2", "4v3", np.random.default_rng(0))
+        Transfer("4v3", "rho2")
+
+
+def learned(task, profile="default", role=Role.KEEPER, **changes):
+    parsed = Task.parse(task)
+    tiling = make_tiling(role, parsed.num_keepers, parsed.num_takers, profile=profile)
+    return LearnedWeights(
+        values=np.random.default_rng(0).normal(size=tiling.weights_shape(parsed.num_keepers)),
+        role=role,
+        num_keepers=parsed.num_keepers,
+        num_takers=parsed.num_takers,
+        field_length=25.0,
+        field_width=25.0,
+        tiling=tiling,
+        **changes,
+    )
+
+
+@pytest.mark.parametrize("variant", sorted(VARIANTS))
+@pytest.mark.parametrize("profile", ["default", "framework"])
+def test_every_variant_makes_whole_weights_of_the_target_task(variant, profile):
+    found = transferred(learned("3v2", profile), Transfer("4v3", variant))
+    assert (found.task, found.tiling) == ("4v3", tiling_of("4v3", profile))
+    assert found.values.any()
+
+
+def test_what_a_keeper_learned_and_how_goes_with_its_weights():
+    sarsa = SarsaConfig(epsilon=0.05)
+    source = learned("3v2", sarsa=sarsa, episodes=1000, hours=2.5, player="keeper_2", ordering="k1")
+    found = transferred(source, Transfer("4v3"))
+    assert (found.sarsa, found.episodes, found.hours) == (sarsa, 1000, 2.5)
+    assert (found.player, found.ordering) == ("keeper_2", "k1")
+
+
+def test_other_widths_than_the_sources_can_be_asked_for():
+    found = transferred(learned("3v2", "framework"), Transfer("4v3", widths="default"))
+    assert found.tiling == tiling_of("4v3")
+
+
+def test_a_mapping_of_ones_own_is_used_instead_of_the_variants():
+    source = learned("3v2")
+    own = transferred(source, Transfer("4v3", mapping=partial_mapping("3v2", "4v3")))
+    np.testing.assert_array_equal(
+        own.values, transferred(source, Transfer("4v3", "partial")).values
+    )
+
+
+def test_a_mapping_between_other_tasks_is_refused():
+    with pytest.raises(MappingError, match="from 4v3 to 5v4, not from 3v2 to 4v3"):
+        transferred(learned("3v2"), Transfer("4v3", mapping=rho_mapping("4v3", "5v4")))
+
+
+def test_the_weights_of_a_taker_are_refused():
+    with pytest.raises(MappingError, match="weights of a taker"):
+        transferred(learned("3v2", role=Role.TAKER), Transfer("4v3"))
+
+
+def test_transferred_weights_survive_their_file(tmp_path):
+    found = transferred(learned("3v2"), Transfer("4v3"))
+    save_weights(tmp_path / "keeper.npz", found)
+    np.testing.assert_array_equal(load_weights(tmp_path / "keeper.npz").values, found.values)

@@ -8,12 +8,16 @@ unequal ones the 32 active tiles of a value take weights from around the same va
 the target's width instead of the source's.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keepaway_agent.cmac import NUM_TILINGS, Tiling
+from keepaway_agent.actions import Role
+from keepaway_agent.cmac import NUM_TILINGS, WIDTH_PROFILES, Tiling, make_tiling
+from keepaway_agent.weights import LearnedWeights
+from keepaway_sim.task import Task
+from keepaway_sim.version import code_version
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES, InterTaskMapping, actions, state_variables
 
@@ -37,6 +41,80 @@ VARIANTS = {
     "partial": Variant("partial"),
     "shuffled": Variant("shuffled"),  # a negative control
 }
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """What decides how a player's weights are carried over.
+
+    Raises:
+        MappingError: no such variant.
+    """
+
+    target: str  # task, "4v3"
+    variant: str = "rho"  # a name in VARIANTS
+    mapping: InterTaskMapping | None = None  # one's own, instead of the variant's
+    seed: int = 0  # of the shuffled mapping
+    widths: str = ""  # profile of the target's tile widths; empty: the source's
+
+    def __post_init__(self) -> None:
+        if self.variant not in VARIANTS:
+            raise MappingError(f"variant={self.variant!r}: choose one of {', '.join(VARIANTS)}")
+
+    def mapping_from(self, source: str) -> InterTaskMapping:
+        """The mapping from this source task.
+
+        Raises:
+            MappingError: one's own mapping is between other tasks, or there is no rule.
+        """
+        if self.mapping is None:
+            rule = MAPPING_RULES[VARIANTS[self.variant].rule]
+            return rule(source, self.target, np.random.default_rng(self.seed))
+        if (self.mapping.source, self.mapping.target) != (source, self.target):
+            raise MappingError(
+                f"the mapping goes from {self.mapping.source} to {self.mapping.target},"
+                f" not from {source} to {self.target}"
+            )
+        return self.mapping
+
+
+def transferred(source: LearnedWeights, transfer: Transfer) -> LearnedWeights:
+    """What a keeper of the target task starts with, after a keeper of the source task.
+
+    The field, the order of players and the learning parameters stay what they were, and so do the
+    episodes and hours it took.
+
+    Raises:
+        MappingError: weights of a taker, tiles of no known profile, or as `rho` and `Transfer` do.
+    """
+    if source.role != Role.KEEPER:
+        raise MappingError(f"weights of a {source.role.name.lower()}: rho is for keepers'")
+    target = Task.parse(transfer.target)
+    tiling = make_tiling(
+        Role.KEEPER,
+        target.num_keepers,
+        target.num_takers,
+        source.field_length,
+        source.field_width,
+        transfer.widths or _profile(source),
+    )
+    variant = VARIANTS[transfer.variant]
+    values = rho(
+        source.values,
+        source.tiling,
+        tiling,
+        transfer.mapping_from(source.task),
+        averaged=variant.averaged,
+        rescaled=variant.rescaled,
+    )
+    return replace(
+        source,
+        values=values,
+        tiling=tiling,
+        num_keepers=target.num_keepers,
+        num_takers=target.num_takers,
+        code_version=code_version(),
+    )
 
 
 def rho(
@@ -102,13 +180,19 @@ def nearest_tiles(
     return np.asarray(np.clip(nearest, 0, source.num_tiles * NUM_TILINGS - 1), dtype=np.int64)
 
 
-def variant_mapping(
-    variant: str, source_task: str, target_task: str, generator: np.random.Generator
-) -> InterTaskMapping:
-    """The mapping that a variant uses between two tasks; `generator` deals out the shuffled one."""
-    if variant not in VARIANTS:
-        raise MappingError(f"variant={variant!r}: choose one of {', '.join(VARIANTS)}")
-    return MAPPING_RULES[VARIANTS[variant].rule](source_task, target_task, generator)
+def _profile(source: LearnedWeights) -> str:
+    """The profile of tile widths that made the source's tiling."""
+    teams, field = (
+        (source.num_keepers, source.num_takers),
+        (source.field_length, source.field_width),
+    )
+    for profile in WIDTH_PROFILES:
+        if make_tiling(Role.KEEPER, *teams, *field, profile) == source.tiling:
+            return profile
+    raise MappingError(
+        f"the weights have tiles of no known profile: name the target's,"
+        f" {' or '.join(WIDTH_PROFILES)}"
+    )
 
 
 def _check_tasks(
