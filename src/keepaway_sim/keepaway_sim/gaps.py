@@ -1,0 +1,117 @@
+"""Was everything recorded? Counts, by topic, the cycles that a recording misses.
+
+Perceptions and field states are stamped with simulated time and come once a cycle, so a step of
+their stamps by more than one cycle names what is missing. A request is missed if a decision was
+due and nobody answered.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+
+from keepaway_sim.messages import ACTION_REQUEST, CYCLE_NS, FIELD_STATE, PERCEPTION
+
+_PERCEPTION = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome, decision due
+_FIELD_STATE = struct.Struct("<4xiIII")  # stamp, episode, cycle
+_ACTION_REQUEST = struct.Struct("<4xB3xII")  # player, episode, cycle
+_FORGET_AFTER = 1000  # [decisions] an answer that is so late does not come any more
+
+
+@dataclass
+class TopicCount:
+    """What came on one topic."""
+
+    received: int = 0
+    missing: int = 0  # [cycles] between the first and the last that came
+    repeated: int = 0  # sent again
+    first: int = -1  # [ns] simulated time
+    last: int = -1
+
+
+@dataclass
+class GapCounter:
+    """Fed with every message of a recording in its order, knows what is missing.
+
+    Attributes:
+        selected: the recording has selected episodes only: an episode may begin at any time.
+        topics: counts of the topics that come every cycle, by name.
+        unanswered: by player index, decisions that were due and never answered.
+    """
+
+    selected: bool = False
+    topics: dict[str, TopicCount] = field(default_factory=dict)
+    unanswered: dict[int, int] = field(default_factory=dict)
+    _open: dict[int, dict[tuple[int, int], bool]] = field(default_factory=dict)
+    _newest: tuple[int, int] = (-1, -1)  # episode and cycle of the last perception
+
+    def feed(self, topic: str, message_type: str, data: bytes) -> None:
+        """Count one message. Other types than the three that come every cycle are passed over."""
+        if message_type == PERCEPTION:
+            sec, nanosec, player, episode, cycle, _, due = _PERCEPTION.unpack_from(data)
+            if self._count(topic, sec * 1_000_000_000 + nanosec, cycle) and due:
+                self._newest = (episode, cycle)
+                self._pair(player, self._newest, True)
+        elif message_type == FIELD_STATE:
+            sec, nanosec, _, cycle = _FIELD_STATE.unpack_from(data)
+            self._count(topic, sec * 1_000_000_000 + nanosec, cycle)
+        elif message_type == ACTION_REQUEST:
+            player, episode, cycle = _ACTION_REQUEST.unpack_from(data)
+            self._pair(player, (episode, cycle), False)
+
+    def missing(self) -> dict[str, int]:
+        """Cycles missing by topic, those before its first and after its last message included."""
+        seen = [count for count in self.topics.values() if count.received]
+        start = min((count.first for count in seen), default=0)
+        end = max((count.last for count in seen), default=0)
+        ends = {
+            name: (count.first - start + end - count.last) // CYCLE_NS
+            for name, count in self.topics.items()
+        }
+        return {name: count.missing + ends[name] for name, count in self.topics.items()}
+
+    def unanswered_decisions(self) -> dict[int, int]:
+        """Decisions without an answer by player, those of the last cycle left out."""
+        return {
+            player: self.unanswered.get(player, 0)
+            + sum(due and key != self._newest for key, due in keys.items())
+            for player, keys in sorted(self._open.items())
+        }
+
+    def report(self) -> str:
+        """In words, naming the topics that miss something."""
+        missing = {name: count for name, count in self.missing().items() if count}
+        late = {player: count for player, count in self.unanswered_decisions().items() if count}
+        received = sum(count.received for count in self.topics.values())
+        parts = [f"{name} misses {count} cycles" for name, count in missing.items()]
+        parts += [f"player {player} left {count} decisions open" for player, count in late.items()]
+        return "; ".join(parts) or f"nothing is missing of {received} perceptions and states"
+
+    def complete_until(self) -> int:
+        """Simulated time [ns] until which every topic that comes each cycle has come; -1: none."""
+        return min((count.last for count in self.topics.values()), default=-1)
+
+    def _count(self, topic: str, stamp: int, cycle: int) -> bool:
+        """Whether the message is a new one."""
+        count = self.topics.setdefault(topic, TopicCount())
+        if count.received and stamp == count.last:
+            count.repeated += 1
+            return False
+        if not count.received:
+            count.first = stamp
+        elif stamp > count.last and not (self.selected and cycle == 0):
+            count.missing += (stamp - count.last) // CYCLE_NS - 1
+        count.received += 1
+        count.last = stamp
+        return True
+
+    def _pair(self, player: int, key: tuple[int, int], due: bool) -> None:
+        """Let decisions and answers find each other, whichever comes first."""
+        keys = self._open.setdefault(player, {})
+        if keys.get(key, due) != due:
+            del keys[key]
+            return
+        keys[key] = due
+        if len(keys) > _FORGET_AFTER:
+            oldest = next(iter(keys))
+            self.unanswered[player] = self.unanswered.get(player, 0) + keys.pop(oldest)

@@ -1,0 +1,54 @@
+"""Matches recorded for tests: a World played by a simple rule, into a bag."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from keepaway_sim.config import Config
+from keepaway_sim.episodes import FieldRecorder, world_info
+from keepaway_sim.recording import BagWriter
+from keepaway_sim.task import Action, Outcome, Task
+from keepaway_sim.vision import Perceptions
+from keepaway_sim.world import World
+
+
+def record_match(path: Path, task: str, seed: int, episodes: int) -> Path:
+    """Play and record `episodes` episodes; keepers pass round, with made-up action values."""
+    world = World(Task.parse(task), Config())
+    world.start(0, np.random.SeedSequence(entropy=seed, spawn_key=(0, 0)))
+    with BagWriter(path, world_info(world, seed), flush_interval=math.inf) as bag:
+        recorder = FieldRecorder(bag, world, 0, seed)
+        recorder.moment()
+        while world.perceptions.episode[0] < episodes:
+            action, target, values = simple_requests(world.perceptions, world.task)
+            recorder.requests(action, target, values)
+            world.step(action[None], target[None])
+            if world.perceptions.episode[0] < episodes:
+                recorder.moment()
+    return path
+
+
+def simple_requests(
+    seen: Perceptions, task: Task
+) -> tuple[np.ndarray, np.ndarray, list[list[float]]]:
+    """What players of field 0 ask for: with the ball they pass to the next keeper, now and then."""
+    num, keepers = task.num_players, task.num_keepers
+    action = np.full(num, Action.GO_TO_BALL)
+    target = np.zeros(num, dtype=np.int64)
+    values: list[list[float]] = [[] for _ in range(num)]
+    for player in range(keepers):
+        cycles = seen.cycles_to_ball[0, player, :keepers]
+        if seen.ball_kickable[0, player]:
+            passes = seen.cycle[0] % 8 == 0
+            action[player] = Action.PASS_BALL if passes else Action.HOLD_BALL
+            target[player] = (player + 1) % keepers if passes else 0
+            values[player] = [float(seen.cycle[0] + k) for k in range(keepers)]
+        elif cycles.argmin() != player:
+            action[player] = Action.GET_OPEN
+    return action, target, values
+
+
+def in_play(world: World) -> bool:
+    """Whether field 0's episode goes on."""
+    return bool(world.perceptions.outcome[0] == Outcome.IN_PLAY)
