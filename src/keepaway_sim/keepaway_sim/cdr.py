@@ -27,6 +27,7 @@ from keepaway_sim.errors import KeepawayError
 
 HEADER = b"\x00\x01\x00\x00"
 """CDR, little-endian, no options; alignment counts from its end."""
+PAYLOAD = 4  # [bytes] RTPS sends whole words: so padded, messages arrive as they were sent
 _SEPARATOR = "=" * 80
 _SIZES = {
     "bool": "?", "byte": "B", "char": "B",
@@ -79,7 +80,7 @@ class Codec:
             self._write(out, self._root, values)
         except (struct.error, TypeError, AttributeError) as error:
             raise KeepawayError(f"cannot encode {self.message_type}: {error}") from error
-        return bytes(out)
+        return bytes(out) + bytes(-len(out) % PAYLOAD)
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """The values of a message: numbers, strings, lists, and dicts for messages inside it.
@@ -94,11 +95,15 @@ class Codec:
         except (struct.error, UnicodeDecodeError) as error:
             raise KeepawayError(f"{len(data)} bytes are no {self.message_type}: {error}") from error
 
-    def dtype(self, lengths: Mapping[str, int]) -> np.dtype[np.void]:
+    def dtype(self, lengths: Mapping[str, int], size: int = 0) -> np.dtype[np.void]:
         """All messages whose sequences have these lengths, as one structured type.
 
         A field `stamp` with parts is named `stamp.sec`, `stamp.nanosec`; a sequence `ages` comes
         with `ages.length`. Bytes between the fields are padding.
+
+        Args:
+            lengths: of the message's sequences.
+            size: bytes of a message, if they may be padded otherwise than `encode` does.
 
         Raises:
             KeepawayError: the message has strings or sequences of messages.
@@ -111,8 +116,9 @@ class Codec:
             formats.append(format_)
             offsets.append(position)
             position += np.dtype(format_).itemsize
+        size = size or _aligned(position, PAYLOAD)
         return np.dtype(
-            {"names": names, "formats": formats, "offsets": offsets, "itemsize": position}
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": size}
         )
 
     def lengths(self, values: Mapping[str, Any]) -> dict[str, int]:

@@ -52,6 +52,7 @@ class Vision:
     quantize_step: float = 0.1  # [1] log-distance step of players and ball; 0 is exact
     direction_step: float = 1.0  # [deg] seen directions are rounded to it; 0 is exact
     change_step: float = 0.02  # [1] step of distance change over distance; 0 is exact
+    speed_step: float = 0.01  # [m/cycle] own felt speed is rounded to it; 0 is exact
     self_position_error: float = 0.15  # [m] largest error of own position after a look
     self_yaw_error: float = 0.3  # [deg] largest error of own direction after a look
     feel_distance: float = 3.0  # [m] S: visible_distance, felt all round
@@ -174,6 +175,7 @@ def noiseless(config: Config) -> Config:
         quantize_step=0.0,
         direction_step=0.0,
         change_step=0.0,
+        speed_step=0.0,
         self_position_error=0.0,
         self_yaw_error=0.0,
     )

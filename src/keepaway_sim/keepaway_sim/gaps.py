@@ -45,6 +45,10 @@ class GapCounter:
     _open: dict[int, dict[tuple[int, int], bool]] = field(default_factory=dict)
     _newest: tuple[int, int] = (-1, -1)  # episode and cycle of the last perception
 
+    def expect(self, topic: str) -> None:
+        """A topic that comes every cycle, also if nothing ever comes on it."""
+        self.topics.setdefault(topic, TopicCount())
+
     def feed(self, topic: str, message_type: str, data: bytes) -> None:
         """Count one message. Other types than the three that come every cycle are passed over."""
         if message_type == PERCEPTION:
@@ -64,11 +68,13 @@ class GapCounter:
         seen = [count for count in self.topics.values() if count.received]
         start = min((count.first for count in seen), default=0)
         end = max((count.last for count in seen), default=0)
-        ends = {
-            name: (count.first - start + end - count.last) // CYCLE_NS
+        whole = (end - start) // CYCLE_NS + 1 if seen else 0
+        return {
+            name: count.missing + (count.first - start + end - count.last) // CYCLE_NS
+            if count.received
+            else whole
             for name, count in self.topics.items()
         }
-        return {name: count.missing + ends[name] for name, count in self.topics.items()}
 
     def unanswered_decisions(self) -> dict[int, int]:
         """Decisions without an answer by player, those of the last cycle left out."""
@@ -88,12 +94,13 @@ class GapCounter:
         return "; ".join(parts) or f"nothing is missing of {received} perceptions and states"
 
     def complete_until(self) -> int:
-        """Simulated time [ns] until which every topic that comes each cycle has come; -1: none."""
+        """Simulated time [ns] that every topic that comes each cycle has reached; -1: none yet."""
         return min((count.last for count in self.topics.values()), default=-1)
 
     def _count(self, topic: str, stamp: int, cycle: int) -> bool:
         """Whether the message is a new one."""
-        count = self.topics.setdefault(topic, TopicCount())
+        self.expect(topic)
+        count = self.topics[topic]
         if count.received and stamp == count.last:
             count.repeated += 1
             return False

@@ -1,7 +1,7 @@
 """Predictions of a player's own and others' movement: who reaches the ball when, and how.
 
-Source: P WorldModelPredict.cc. Simplified: the meeting point is the first one in reach, or one
-of the next two if it is the point already chosen (P looks twenty cycles further for it).
+Source: P WorldModelPredict.cc. Simplified: the meeting point is the first one in reach unless the
+one already chosen can still be met safely (P also moves on to a safer point next to it).
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from keepaway_sim.geometry import clip, rolling, wrap
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
 SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
+BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
+KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
@@ -110,30 +112,42 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
         old_x, old_y, has_old: the meeting point chosen in the last cycles, if any.
 
     Returns:
-        cycles (NEVER if not within the horizon), x, y of the ball then.
+        cycles (BEYOND if not within the horizon), x, y of the ball then.
     """
-    first = NEVER
-    first_x, first_y = ball[0], ball[1]
+    first, first_x, first_y = NEVER, 0.0, 0.0
+    kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
     bx, by = ball[0], ball[1]
     wx, wy = ball_v[0], ball_v[1]
     for i in range(c.intercept_horizon + 1):
-        roll = rolling(c.player_decay, min(i, LOOK_AHEAD))
-        rest = math.hypot(bx - x - roll * vx, by - y - roll * vy)
-        if rest / c.player_speed_max <= i + c.kickable_distance:
-            left = reach_after(c, x, y, vx, vy, yaw, bx, by, i)
-            if left < c.kickable_distance:
-                if first == NEVER:
-                    first, first_x, first_y = i, bx, by
-                    if not has_old or math.hypot(wx, wy) <= MOVING_BALL:
-                        break
-                near_old = math.hypot(bx - old_x, by - old_y) < SAME_POINT
-                if near_old and left < SAFE_SHARE * c.kickable_distance:
-                    return i, bx, by
-        if first != NEVER and i >= first + 2:
+        off = math.hypot(bx - old_x, by - old_y) if has_old else math.inf
+        moving = math.hypot(wx, wy) > MOVING_BALL
+        candidate = moving and off < kept_off
+        if first == NEVER or candidate:
+            left = _left_after(c, x, y, vx, vy, yaw, bx, by, i)
+            if first == NEVER and left < c.kickable_distance:
+                first, first_x, first_y = i, bx, by
+            if candidate and left < SAFE_SHARE * c.kickable_distance:
+                kept, kept_x, kept_y, kept_off = i, bx, by, off
+        if first != NEVER and (not has_old or not moving or i >= first + KEEP_HORIZON):
             break
         bx, by = bx + wx, by + wy
         wx, wy = c.ball_decay * wx, c.ball_decay * wy
-    return first, first_x, first_y
+    if kept != NEVER:
+        return kept, kept_x, kept_y
+    if first != NEVER:
+        return first, first_x, first_y
+    roll = rolling(c.ball_decay, BEYOND)
+    return BEYOND, ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
+
+
+@njit(cache=True)
+def _left_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
+    """`reach_after`, not simulated where the point is out of question."""
+    roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
+    rest = math.hypot(to_x - x - roll * vx, to_y - y - roll * vy)
+    if rest / c.player_speed_max > cycles + c.kickable_distance:
+        return math.inf
+    return reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles)
 
 
 @njit(cache=True)

@@ -34,6 +34,7 @@ MARKERS = "visualization_msgs/msg/MarkerArray"
 SECOND = 1_000_000_000  # [ns]
 CYCLE_NS = round(CYCLE_TIME * SECOND)
 _STAMP = struct.Struct("<iI")
+_MOMENT = struct.Struct("<II")
 _REQUEST = struct.Struct("<4xB3xIIBB")  # CDR header, then ActionRequest's fields but the values
 
 
@@ -54,6 +55,16 @@ def read_request(data: bytes) -> Request:
         struct.error: too few bytes.
     """
     return Request(*_REQUEST.unpack_from(data))
+
+
+def read_moment(data: bytes) -> tuple[int, int]:
+    """Episode and cycle in a Perception's bytes.
+
+    Raises:
+        struct.error: too few bytes.
+    """
+    episode, cycle = _MOMENT.unpack_from(data, 16)
+    return episode, cycle
 
 
 def clean_request(data: bytes) -> bytes:

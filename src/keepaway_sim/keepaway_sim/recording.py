@@ -71,6 +71,11 @@ class Qos(NamedTuple):
         }
 
 
+def default_qos(message_type: str) -> Qos:
+    """How topics of a type are offered in a match: what is said once is latched."""
+    return Qos(1, transient_local=True) if message_type in _LATCHED else Qos()
+
+
 class Topic(NamedTuple):
     """A topic of a bag."""
 
@@ -103,6 +108,7 @@ class BagWriter:
 
     Attributes:
         path: the bag's folder.
+        topics: by name, those registered so far.
         message_count: messages written so far.
     """
 
@@ -140,7 +146,7 @@ class BagWriter:
             ) from None
         self.message_count = 0
         self._info: dict[str, str] = {}
-        self._topics: dict[str, Topic] = {}
+        self.topics: dict[str, Topic] = {}
         self._counts: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
@@ -180,13 +186,12 @@ class BagWriter:
         Raises:
             KeepawayError: registered with another type, or the message is not installed.
         """
-        known = self._topics.get(name)
+        known = self.topics.get(name)
         if known is not None:
             if known.message_type != message_type:
                 raise KeepawayError(f"{name} carries {known.message_type}, not {message_type}")
             return
-        if qos is None:
-            qos = Qos(1, transient_local=True) if message_type in _LATCHED else Qos()
+        qos = qos or default_qos(message_type)
         if definition is None:
             definition, type_hash = cdr.definition(message_type), cdr.type_hash(message_type)
         topic = Topic(name, message_type, definition, type_hash or "", qos)
@@ -203,7 +208,7 @@ class BagWriter:
                 "topic_type_hash": topic.type_hash,
             },
         )
-        self._topics[name], self._counts[name] = topic, 0
+        self.topics[name], self._counts[name] = topic, 0
 
     def write(self, topic: str, message_type: str, data: bytes, log_time: int) -> None:
         """Write one message.
@@ -283,7 +288,7 @@ class BagWriter:
                     },
                     "message_count": self._counts[topic.name],
                 }
-                for topic in self._topics.values()
+                for topic in self.topics.values()
             ],
             "compression_format": "",  # of whole files or messages; chunks are MCAP's own matter
             "compression_mode": "",
@@ -405,8 +410,8 @@ class BagReader:
         while len(index):
             first, last = index[0, 2:]
             lengths = codec.lengths(codec.decode(raw[first:last].tobytes()))
-            dtype = codec.dtype(lengths)
-            size = last - first
+            size = int(last - first)
+            dtype = codec.dtype(lengths, size)
             data = raw[index[:, 2, None] + np.arange(size)].view(dtype)[:, 0]
             alike = np.ones(len(index), dtype=bool)
             for name, length in lengths.items():

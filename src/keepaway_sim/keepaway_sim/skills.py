@@ -25,9 +25,7 @@ from keepaway_sim.intercept import (
 )
 from keepaway_sim.physics import kick_acceleration, kick_rate, limited
 from keepaway_sim.task import Action
-from keepaway_sim.vision import same_team, turn_neck
-
-NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0
+from keepaway_sim.vision import DASH, KICK, NONE, TURN, same_team, turn_neck
 
 _HOLD = int(Action.HOLD_BALL)
 _PASS = int(Action.PASS_BALL)
@@ -485,8 +483,6 @@ def intercept(c, s, m, f, p):
     )
     m.intercept_cycle[f, p] = now
     m.intercept_point[f, p, 0], m.intercept_point[f, p, 1] = to_x, to_y
-    if cycles == NEVER:
-        return move_to(c, s, f, p, to_x, to_y, c.when_to_turn, 0.0)
     if cycles < 3:
         close = meet_closely(c, s, f, p)
         if close[0] != NONE:

@@ -21,10 +21,13 @@ from numba import njit
 
 from keepaway_sim.config import NEVER
 from keepaway_sim.geometry import TWO_PI, quantize, wrap
-from keepaway_sim.physics import kick_acceleration, limited
+from keepaway_sim.physics import dash_acceleration, kick_acceleration, limited
 from keepaway_sim.streams import draw
 
+NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0  # kinds of commands
+
 CHASE_SPEED = 0.3  # [m/cycle] P: an unseen opponent nearest to the ball is believed to come so fast
+BUMPED_DISTANCE = 0.2  # [m] P: where a ball is believed after a bump
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
 CHANGED_VELOCITY = 0.3  # [m/cycle] or one whose idea of its velocity differs by more
 DEAF_RANGE = 3.0  # [m] P: nearer to the ball than this, a player trusts itself
@@ -189,12 +192,22 @@ def remember(c, s, m, f, p):
     position[ball, 1] += velocity[ball, 1]
     velocity[ball, 0] *= c.ball_decay
     velocity[ball, 1] *= c.ball_decay
-    if not kicked and chaser >= 0:
-        dx = position[ball, 0] - position[chaser, 0]
-        dy = position[ball, 1] - position[chaser, 1]
-        if math.hypot(dx, dy) < c.kickable_distance:
-            velocity[ball, 0] = 0.0  # P: an opponent has it, so nobody knows where it goes
-            velocity[ball, 1] = 0.0
+    if not kicked:
+        _stop_ball_of_opponent(c, s, f, p)
+
+
+@njit(cache=True)
+def _stop_ball_of_opponent(c, s, f, p):
+    """P: a ball within an opponent's reach is believed to lie still; nobody knows his plans."""
+    ball = c.num_keepers + c.num_takers
+    opponent = _nearest_opponent_to_ball(c, s, f, p)
+    if opponent < 0:
+        return
+    dx = s.position[f, p, ball, 0] - s.position[f, p, opponent, 0]
+    dy = s.position[f, p, ball, 1] - s.position[f, p, opponent, 1]
+    if math.hypot(dx, dy) < c.kickable_distance:
+        s.velocity[f, p, ball, 0] = 0.0
+        s.velocity[f, p, ball, 1] = 0.0
 
 
 @njit(cache=True)
@@ -214,12 +227,70 @@ def _nearest_opponent_to_ball(c, s, f, p):
 
 @njit(cache=True)
 def feel_self(c, s, m, position, velocity, f, p):
-    """Own position and velocity as the body feels them; both are nearly exact in the server."""
+    """Own position and speed as the body feels them, nearly exact; a bump shows in the speed."""
+    ux, uy = _expected_own_velocity(c, s, m, f, p)
     s.position[f, p, p, 0] = position[p, 0] + m.self_error[f, p, 0]
     s.position[f, p, p, 1] = position[p, 1] + m.self_error[f, p, 1]
-    s.velocity[f, p, p, 0] = velocity[p, 0]
-    s.velocity[f, p, p, 1] = velocity[p, 1]
+    speed = math.hypot(velocity[p, 0], velocity[p, 1])
+    share = quantize(speed, c.speed_step) / speed if speed > 0.0 else 0.0
+    vx, vy = share * velocity[p, 0], share * velocity[p, 1]
+    s.velocity[f, p, p, 0], s.velocity[f, p, p, 1] = vx, vy
     s.age[f, p, p] = 0
+    if s.cycle[f] > 0 and _seems_bumped(c, s, f, p, vx, vy, ux, uy):
+        _bump_ball(c, s, f, p)
+
+
+@njit(cache=True)
+def _expected_own_velocity(c, s, m, f, p):
+    """Velocity that player p expects of its last command, before it feels the real one."""
+    vx, vy = s.velocity[f, p, p]
+    if m.command[f, p, 0] == DASH:
+        ax, ay = dash_acceleration(c, m.command[f, p, 1], s.body[f, p, p])
+        vx, vy = limited(vx + ax, vy + ay, c.player_speed_max)
+    return c.player_decay * vx, c.player_decay * vy
+
+
+@njit(cache=True)
+def _seems_bumped(c, s, f, p, vx, vy, ux, uy):
+    """P: does felt velocity (vx, vy) against the expected (ux, uy) mean a bump into the ball?"""
+    ball = c.num_keepers + c.num_takers
+    own = s.position[f, p, p]
+    away = math.hypot(s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1])
+    felt, expected = math.hypot(vx, vy), math.hypot(ux, uy)
+    if felt == 0.0:
+        stopped = expected > 0.01 and away < 0.8
+        return stopped or away < c.touch_distance
+    if away >= c.kickable_distance + 0.5 or felt >= 0.25 * expected:
+        return False
+    return _turned_round(vx, ux) and _turned_round(vy, uy)
+
+
+@njit(cache=True, inline="always")
+def _turned_round(felt, expected):
+    return felt * expected < 0.0 or abs(expected) < 0.08
+
+
+@njit(cache=True)
+def _bump_ball(c, s, f, p):
+    """P: after a bump the ball is believed just before the body, its velocity reversed.
+
+    Unless another player is believed nearer, who then was bumped into.
+    """
+    ball = c.num_keepers + c.num_takers
+    own = s.position[f, p, p]
+    dx, dy = s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1]
+    distance = math.hypot(dx, dy)
+    for j in range(ball):
+        if j == p or s.age[f, p, j] > c.player_lost_age:
+            continue
+        away = math.hypot(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        if away < distance:
+            return
+    angle = math.atan2(dy, dx)
+    s.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * math.cos(angle)
+    s.position[f, p, ball, 1] = own[1] + BUMPED_DISTANCE * math.sin(angle)
+    s.velocity[f, p, ball, 0] *= -0.1
+    s.velocity[f, p, ball, 1] *= -0.1
 
 
 @njit(cache=True)
@@ -305,8 +376,11 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
             c, s, velocity, f, p, j, dx, dy, distance, direction, seen,
             face + yaw_error, yaw_error, uniforms, cursor,
         )  # fmt: skip
-        if seen and j < num and s.age[f, p, j] == 0:
+        if seen and j < num:
             s.body[f, p, j] = wrap(yaw[j] + yaw_error)
+    own, ball = s.position[f, p, p], s.position[f, p, num]
+    if math.hypot(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
+        _stop_ball_of_opponent(c, s, f, p)
 
 
 @njit(cache=True)

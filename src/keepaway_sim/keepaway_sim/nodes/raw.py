@@ -1,0 +1,76 @@
+"""What recorder and replayer share: parameters, and messages of any type that pass as bytes."""
+
+import importlib
+from collections.abc import Collection
+from dataclasses import fields
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.recording import Qos
+
+
+Settings = TypeVar("Settings")
+
+
+def declared(node: Node, settings: type[Settings], changeable: Collection[str] = ()) -> Settings:
+    """Declare the fields of a dataclass as a node's parameters, and read them.
+
+    Args:
+        node: whose parameters.
+        settings: a dataclass with a default for every field.
+        changeable: those that may be set while the node runs.
+
+    Raises:
+        KeepawayError: whatever the dataclass refuses.
+    """
+    return settings(
+        **{
+            field.name: node.declare_parameter(
+                field.name,
+                field.default,
+                ParameterDescriptor(read_only=field.name not in changeable),
+            ).value
+            for field in fields(settings)  # type: ignore[arg-type]
+        }
+    )
+
+
+def message_class(message_type: str) -> type[Any]:
+    """The Python class of "package/msg/Name".
+
+    Raises:
+        KeepawayError: it is not installed.
+    """
+    package, _, name = message_type.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
+    except (ImportError, AttributeError) as error:
+        raise KeepawayError(f"{message_type} is not installed: {error}") from error
+
+
+def to_profile(qos: Qos, depth: int) -> QoSProfile:
+    """A QoS profile of that kind with a history of its own depth."""
+    return QoSProfile(
+        depth=depth,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL
+        if qos.transient_local
+        else DurabilityPolicy.VOLATILE,
+        reliability=ReliabilityPolicy.RELIABLE if qos.reliable else ReliabilityPolicy.BEST_EFFORT,
+    )
+
+
+def offered_qos(node: Node, topic: str, otherwise: Qos) -> Qos:
+    """How a topic's publisher offers it. (Its depth is nobody's business, so nobody is told.)"""
+    publishers = node.get_publishers_info_by_topic(topic)
+    if not publishers:
+        return otherwise
+    profile = publishers[0].qos_profile
+    return Qos(
+        otherwise.depth,
+        profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+        profile.reliability == ReliabilityPolicy.RELIABLE,
+    )

@@ -1,0 +1,245 @@
+"""The recorder's node: everything that is said in a match, into a bag, with a count of what is missing.
+
+It does not spin: two hundred times a second it takes all that came from its subscriptions, as
+bytes. That costs a fraction of a callback for each message, and deep histories keep what comes in
+between. The simulator can wait for it: `recorded` says which simulated time it has reached.
+"""
+
+import json
+import signal
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import rclpy
+from builtin_interfaces.msg import Time
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
+
+from keepaway_sim.cdr import codec
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.gaps import GapCounter
+from keepaway_sim.messages import (
+    ACTION_REQUEST,
+    AGENT_STATUS,
+    CLOCK,
+    EPISODE,
+    FIELD_STATE,
+    MARKERS,
+    MATCH,
+    PERCEPTION,
+    read_moment,
+    read_request,
+    stamp,
+    stamp_of,
+)
+from keepaway_sim.nodes.raw import declared, message_class, offered_qos, to_profile
+from keepaway_sim.recording import BagWriter, default_qos
+from keepaway_sim.version import code_version
+
+POLL_PERIOD = 0.005  # [s]
+FLUSH_PERIOD = 1.0  # [s]
+QUIET = 0.3  # [s] nothing came for so long: all that was said has come
+LONGEST_FAREWELL = 5.0  # [s] a match that goes on is left after so long
+REMEMBERED_CYCLES = 100  # whose time is known when a request answers them
+SAID_BY_THE_MATCH = {
+    "/clock": CLOCK,
+    "match": MATCH,
+    "field_state": FIELD_STATE,
+    "episode": EPISODE,
+    "markers": MARKERS,
+}
+SAID_BY_PLAYERS = {
+    "perception": PERCEPTION,
+    "action_request": ACTION_REQUEST,
+    "status": AGENT_STATUS,
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The recorder's parameters.
+
+    Raises:
+        KeepawayError: a value outside its range.
+    """
+
+    path: str = ""  # folder of the bag to write
+    compression: str = "zstd"  # of its chunks: zstd, lz4 or none
+    history: int = 2000  # messages that a topic keeps until they are taken
+    more_topics: str = ""  # to record too, as /topic=package/msg/Name, comma-separated
+
+    def __post_init__(self) -> None:
+        if not self.path:
+            raise KeepawayError("path is not set: name the bag that is to be made")
+        if self.history < 1:
+            raise KeepawayError(f"history={self.history}: give 1 or more")
+
+    def topics(self) -> dict[str, str]:
+        """The types of the topics that are recorded from the start on."""
+        entries = [entry.partition("=") for entry in self.more_topics.split(",") if entry]
+        for topic, _, message_type in entries:
+            if message_type.count("/") != 2:
+                raise KeepawayError(f"more_topics: {topic} needs a type, =package/msg/Name")
+        return SAID_BY_THE_MATCH | {topic: message_type for topic, _, message_type in entries}
+
+
+class Recorder(Node):
+    """Records one match.
+
+    Attributes:
+        settings: its parameters.
+        bag: where to.
+        gaps: what came and what did not.
+    """
+
+    def __init__(self, **node_options: Any) -> None:
+        """Begin the bag and listen to the match; to its players once it has said who they are.
+
+        Raises:
+            KeepawayError: no path was given, or something is there.
+        """
+        super().__init__("recorder", **node_options)
+        self.settings = declared(self, Settings)
+        self.gaps = GapCounter()
+        self._subscriptions_by_topic: dict[str, tuple[str, Subscription]] = {}
+        self._last_time = 0  # [ns] simulated, of the last stamped message
+        self._times: dict[tuple[int, int], int] = {}  # [ns] of an episode's cycles
+        self._reported = -1
+        self._flushed = time.monotonic()
+        for name, message_type in self.settings.topics().items():
+            self._listen(name, message_type)
+        self._recorded = self.create_publisher(
+            Time, "recorded", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        )
+        info = {"recorder": json.dumps(asdict(self.settings)), "code_version": code_version()}
+        self.bag = BagWriter(self.settings.path, info, self.settings.compression)
+
+    def poll(self) -> int:
+        """Record everything that has come.
+
+        Returns:
+            how many messages.
+        """
+        count = 0
+        for topic, (message_type, subscription) in list(self._subscriptions_by_topic.items()):
+            with subscription.handle:
+                while taken := subscription.handle.take_message(subscription.msg_type, True):
+                    self._record(topic, message_type, taken[0])
+                    count += 1
+        if self._is_listening_to_players():
+            self._report(max(0, self.gaps.complete_until()))
+        if time.monotonic() - self._flushed > FLUSH_PERIOD:
+            self.bag.flush()
+            self._flushed = time.monotonic()
+        return count
+
+    def finish(self) -> str:
+        """Take what is still coming, and close the bag.
+
+        Returns:
+            what is missing, in words.
+        """
+        quiet_since = started = time.monotonic()
+        while time.monotonic() - quiet_since < QUIET:
+            if self.poll():
+                quiet_since = time.monotonic()
+            if time.monotonic() - started > LONGEST_FAREWELL:
+                break
+            time.sleep(POLL_PERIOD)
+        report = self.gaps.report()
+        self.bag.add_info(gaps=report, missing=json.dumps(self.gaps.missing()))
+        self.bag.close()
+        return report
+
+    def _listen(self, name: str, message_type: str) -> None:
+        topic = self.resolve_topic_name(name)
+        if topic in self._subscriptions_by_topic:
+            return
+        qos = to_profile(default_qos(message_type), self.settings.history)
+        subscription = self.create_subscription(
+            message_class(message_type), topic, _never_called, qos, raw=True
+        )
+        self._subscriptions_by_topic[topic] = message_type, subscription
+
+    def _record(self, topic: str, message_type: str, data: bytes) -> None:
+        if topic not in self.bag.topics:
+            qos = offered_qos(self, topic, default_qos(message_type))
+            self.bag.add_topic(topic, message_type, qos)
+        self.gaps.feed(topic, message_type, data)
+        self.bag.write(topic, message_type, data, self._time(message_type, data))
+        if message_type == MATCH:
+            self._listen_to_players(codec(MATCH).decode(data)["player_names"])
+
+    def _listen_to_players(self, names: Sequence[str]) -> None:
+        for player in names:
+            for name, message_type in SAID_BY_PLAYERS.items():
+                self._listen(f"{player}/{name}", message_type)
+            self.gaps.expect(self.resolve_topic_name(f"{player}/perception"))
+        self.gaps.expect(self.resolve_topic_name("field_state"))
+
+    def _is_listening_to_players(self) -> bool:
+        """Whether whoever says something every cycle is known and connected."""
+        topics = self.gaps.topics
+        return len(topics) > 1 and (
+            self._reported >= 0 or all(self.count_publishers(topic) for topic in topics)
+        )
+
+    def _report(self, time_ns: int) -> None:
+        if time_ns != self._reported:
+            self._reported = time_ns
+            self._recorded.publish(Time(**stamp(time_ns)))
+
+    def _time(self, message_type: str, data: bytes) -> int:
+        """When a message was said, simulated [ns]: by its stamp, or what it answers, or now."""
+        own = stamp_of(message_type, data)
+        if own is not None:
+            self._last_time = own
+            if message_type == PERCEPTION:
+                self._remember(read_moment(data), own)
+            return own
+        if message_type == ACTION_REQUEST:
+            asked = read_request(data)
+            return self._times.get((asked.episode, asked.cycle), self._last_time)
+        return self._last_time
+
+    def _remember(self, moment: tuple[int, int], time_ns: int) -> None:
+        self._times[moment] = time_ns
+        if len(self._times) > REMEMBERED_CYCLES:
+            del self._times[next(iter(self._times))]
+
+
+def _never_called(message: bytes) -> None:
+    """Messages are taken by `poll`."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Record until SIGINT or SIGTERM.
+
+    Returns:
+        0 where nothing is missing, 1 where something is, 2 where nothing can be recorded.
+    """
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        recorder = Recorder()
+    except (KeepawayError, InvalidParameterTypeException) as error:
+        print(f"recorder: {error}", file=sys.stderr)
+        return 2
+    recorder.get_logger().info(f"records to {recorder.bag.path}")
+    while not stop.wait(POLL_PERIOD):
+        recorder.poll()
+    report = recorder.finish()
+    missing = any(recorder.gaps.missing().values())
+    log = recorder.get_logger().warning if missing else recorder.get_logger().info
+    log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")
+    rclpy.try_shutdown()
+    return int(missing)

@@ -1,0 +1,402 @@
+"""The simulator's node: one World, played with players who are nodes of their own.
+
+A cycle: every player is sent what it perceives, the answers are waited for (`roster`), the world
+takes a step. Messages are the bytes that `messages` makes, so a recording has just what was sent.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from keepaway_msgs.msg import ActionRequest, AgentStatus
+from keepaway_sim import messages
+from keepaway_sim.cdr import codec
+from keepaway_sim.config import CYCLE_TIME, PROFILES, Config, profile
+from keepaway_sim.episodes import world_info
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.messages import FieldMessages
+from keepaway_sim.nodes.health import diagnostics
+from keepaway_sim.nodes.raw import declared
+from keepaway_sim.nodes.voice import LATCHED, QUEUE, Voice
+from keepaway_sim.recording import BagWriter
+from keepaway_sim.roster import Roster
+from keepaway_sim.task import Outcome, Task
+from keepaway_sim.world import World
+
+WORLD_STREAM = 0
+"""Second entry of the world's spawn key; 1 is that of the players' policies."""
+RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
+MARKER_PERIOD = 0.1  # [s] viewers are not sent more
+HEALTH_PERIOD = 1.0  # [s]
+LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
+FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
+FIXED = ParameterDescriptor(read_only=True)
+ANY_TYPE = ParameterDescriptor(read_only=True, dynamic_typing=True)
+
+Spin = Callable[[float], None]
+"""Lets ROS handle what has come, or waits for it at most so many seconds."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The simulator's parameters beside the world's constants.
+
+    Raises:
+        KeepawayError: a value outside its range.
+    """
+
+    task: str = "3v2"
+    field: str = "25x25"  # length x width [m]
+    seed: int = 0
+    speed: float = 0.0  # simulated over wall time; 0: as fast as the players answer
+    episodes: int = 0  # to play; 0: without end
+    answer_timeout: float = 2.0  # [s] wall time; a player who takes longer is missing
+    autostart: bool = True  # kick off when all players are there
+    record: str = ""  # folder of a bag to write; empty: none
+    record_info: str = "{}"  # JSON object of texts, written into the bag
+
+    def __post_init__(self) -> None:
+        for name in ("seed", "episodes", "speed"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise KeepawayError(f"{name}={getattr(self, name)}: give 0 or more")
+        if not 0 < self.answer_timeout < float("inf"):
+            raise KeepawayError(f"answer_timeout={self.answer_timeout}: give seconds above 0")
+
+
+CHANGEABLE = ("speed", "answer_timeout")
+"""Settings that may be changed while a match is on."""
+
+
+class Simulator(Node):
+    """A match, from waiting for its players to the end of its last episode.
+
+    Attributes:
+        settings, world: what is played.
+        roster: who plays.
+        num_finished, num_cycles: episodes that have ended, cycles played.
+    """
+
+    def __init__(self, **node_options: Any) -> None:
+        """Lay out the field and say what is played.
+
+        Args:
+            node_options: for `rclpy.node.Node`.
+
+        Raises:
+            KeepawayError: parameters that make no match.
+        """
+        super().__init__("simulator", **node_options)
+        self.settings = declared(self, Settings, CHANGEABLE)
+        task = Task.parse(self.settings.task, self.settings.field)
+        self.world = World(task, self._declare_config())
+        seeds = np.random.SeedSequence(self.settings.seed, spawn_key=(0, WORLD_STREAM))
+        self.world.start(0, seeds)
+        self.roster = Roster(task, self.world.config)
+        self.num_finished = self.num_cycles = 0
+        self._is_running, self._is_reset = self.settings.autostart, False
+        self._statuses: dict[int, dict[str, Any]] = {}
+        self._first_counts: dict[int, int] = {}
+        self._perceptions: list[bytes] = []
+        self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
+        self._health_at, self._health_cycles = time.monotonic(), 0
+        self._time_played = 0.0  # [s]
+        self._messages = FieldMessages(self.world)
+        self._prefix = self.get_namespace().rstrip("/") + "/"
+        self._bag = self._open_bag()
+        self._voice = Voice(self, task.player_names, self._bag)
+        self._listen()
+        match = self._messages.match(self.settings.seed, self.settings.speed)
+        self._voice.say("match", match, 0)
+
+    def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
+        """Play until all episodes are over, or somebody says so, or ROS is shut down."""
+        self._is_told_to_end, self._spin = is_told_to_end, spin
+        while not self._is_over():
+            if not self._can_play():
+                spin(RESEND_PERIOD)
+                continue
+            began = time.monotonic()
+            self._send()
+            if not self._is_over():
+                self._collect()
+                self._step()
+            self._time_played += time.monotonic() - began
+        self._say_farewell()
+
+    def close(self) -> None:
+        """Finish the bag."""
+        if self._bag is not None:
+            self._bag.close()
+
+    # Making the node.
+
+    def _declare_config(self) -> Config:
+        """The world's constants: those of a profile, each of which is a parameter, too."""
+        name = str(self.declare_parameter("profile", "2005", ANY_TYPE).value)
+        default = profile(name) if name in PROFILES else profile()
+        changes = {
+            field.name: self.declare_parameter(field.name, getattr(group, field.name), FIXED).value
+            for group in (default.physics, default.vision, default.skills)
+            for field in fields(group)
+        }
+        return profile(name, **changes)
+
+    def _open_bag(self) -> BagWriter | None:
+        if not self.settings.record:
+            return None
+        info = world_info(self.world, self.settings.seed, **json.loads(self.settings.record_info))
+        return BagWriter(Path(self.settings.record), info)
+
+    def _listen(self) -> None:
+        for player, seat in enumerate(self.roster.seats):
+            for topic, message, callback, qos in (
+                ("action_request", ActionRequest, self._on_request, QUEUE),
+                ("status", AgentStatus, self._on_status, LATCHED),
+            ):
+                hear = partial(callback, player)
+                self.create_subscription(message, f"{seat.name}/{topic}", hear, qos, raw=True)
+        for name, serve in (
+            ("start", self._on_start),
+            ("pause", self._on_pause),
+            ("reset", self._on_reset),
+        ):
+            self.create_service(Trigger, name, serve)
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self._health = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
+        self.create_timer(HEALTH_PERIOD, self._say_health)
+
+    # What others say.
+
+    def _on_request(self, player: int, data: bytes) -> None:
+        try:
+            self.roster.take(player, data)
+        except KeepawayError as error:
+            seen, name = self.world.perceptions, self.roster.seats[player].name
+            self.get_logger().warning(
+                f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}",
+                throttle_duration_sec=LOG_PERIOD,
+            )
+
+    def _on_status(self, player: int, data: bytes) -> None:
+        name = self.roster.seats[player].name
+        try:
+            status = codec(messages.AGENT_STATUS).decode(data)
+        except KeepawayError as error:
+            self.get_logger().warning(f"{name}: {error}", throttle_duration_sec=LOG_PERIOD)
+            return
+        if not status["ready"] or (status["player_index"], status["name"]) != (player, name):
+            return
+        self._statuses[player] = {**status, "data": data}
+        if not self.roster.seats[player].present:
+            self.roster.welcome(player)
+            self.get_logger().info(f"{name} is ready: {status['policy']}")
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        given = {p.name: p.value for p in parameters if p.name in CHANGEABLE}
+        try:
+            self.settings = Settings(**{**asdict(self.settings), **given})
+        except KeepawayError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._is_running, response.success = True, True
+        missing = self._missing()
+        response.message = f"waits for {missing}" if missing else "plays"
+        return response
+
+    def _on_pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._is_running, response.success, response.message = False, True, "pauses"
+        return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._is_reset, response.success = True, True
+        response.message = "ends the episode and kicks off the next one"
+        return response
+
+    # A cycle.
+
+    def _is_over(self) -> bool:
+        played = 0 < self.settings.episodes <= self.num_finished
+        return played or self._is_told_to_end() or not self.context.ok()
+
+    def _can_play(self) -> bool:
+        """Is the match on, and somebody there to play it?"""
+        if not self._is_running:
+            return False
+        missing = self._missing()
+        if missing:
+            self.get_logger().warning(f"waits for {missing}", throttle_duration_sec=LOG_PERIOD)
+        elif not self._first_counts:
+            self._first_counts = {p: s["episodes"] for p, s in self._statuses.items()}
+            self._note_statuses()
+        return not missing
+
+    def _missing(self) -> str:
+        """Names of those without whom it cannot go on: at first everybody, later anybody."""
+        if not self._first_counts:
+            return ", ".join(self.roster.absent)
+        return "any player" if self.roster.is_deserted else ""
+
+    def _send(self) -> None:
+        """Tell everybody about this moment."""
+        now, stamp = time.monotonic(), self._messages.stamp_ns()
+        self._say_to_spectators(now, stamp)
+        for name in self.roster.begin(self.world, now):
+            self.get_logger().info(f"{name} is back")
+        self._perceptions = self._messages.perceptions()
+        for seat, data in zip(self.roster.seats, self._perceptions, strict=True):
+            self._voice.say(f"{seat.name}/perception", data, stamp)
+        if self.world.perceptions.outcome[0] != Outcome.IN_PLAY:
+            self._voice.say("episode", self._messages.episode(self.settings.seed), stamp)
+            self.num_finished += 1
+
+    def _collect(self) -> None:
+        """Wait for the answers; unless in lock-step, until the cycle's time is over."""
+        until = self._end_of_cycle()
+        while self._is_collecting(until):
+            self._spin(min(RESEND_PERIOD, max(0.0, until - time.monotonic())))
+            now = time.monotonic()
+            if now >= self._remind_at:
+                self._remind(now)
+
+    def _end_of_cycle(self) -> float:
+        """When the cycle's time is over [s, monotonic]; never in lock-step."""
+        if self.settings.speed == 0:
+            return math.inf
+        duration = CYCLE_TIME / self.settings.speed
+        now = time.monotonic()
+        self._due = max(self._due + duration, now)  # lost time is not caught up with
+        return self._due
+
+    def _is_collecting(self, until: float) -> bool:
+        if self._is_reset or self._is_told_to_end() or not self.context.ok():
+            return False
+        if until < math.inf:
+            return time.monotonic() < until
+        return self.roster.num_awaited > 0
+
+    def _remind(self, now: float) -> None:
+        """Send again what may have been lost, and give up on who does not answer."""
+        self._remind_at = now + RESEND_PERIOD
+        timeout, seen = self.settings.answer_timeout, self.world.perceptions
+        for name in self.roster.dismiss(now, timeout):
+            self.get_logger().error(
+                f"{name} is missing: no answer for {timeout} s, episode {seen.episode[0]} cycle"
+                f" {seen.cycle[0]}; it does the default until it comes back"
+            )
+        for player in self.roster.unanswered(now - RESEND_PERIOD):
+            name = self.roster.seats[player].name
+            self._voice.repeat(f"{name}/perception", self._perceptions[player])
+
+    def _step(self) -> None:
+        """Play the cycle, or end the episode where a reset was asked for."""
+        if self._is_told_to_end() or not self.context.ok():
+            return
+        stamp, seen = self._messages.stamp_ns(), self.world.perceptions
+        for name, data in self.roster.answers():
+            topic = f"{self._prefix}{name}/action_request"
+            self._voice.note(topic, messages.ACTION_REQUEST, data, stamp)
+        reset, self._is_reset = self._is_reset, False
+        if reset and seen.outcome[0] == Outcome.IN_PLAY:
+            self.world.abort(0)
+        else:
+            self.world.step(*self.roster.requests())
+            self.num_cycles += 1
+
+    # Around the cycles.
+
+    def _say_to_spectators(self, now: float, stamp: int) -> None:
+        voice, make = self._voice, self._messages
+        voice.say_if_heard("/clock", make.clock, stamp)
+        voice.say_if_heard("field_state", make.field_state, stamp)
+        if now >= self._markers_at and voice.has_listeners("markers"):
+            self._markers_at = now + MARKER_PERIOD
+            voice.say("markers", make.markers(), stamp)
+
+    def _note_statuses(self) -> None:
+        """Record who plays, in match order."""
+        for player, seat in enumerate(self.roster.seats):
+            if player in self._statuses:
+                topic, data = f"{self._prefix}{seat.name}/status", self._statuses[player]["data"]
+                stamp = self._messages.stamp_ns()
+                self._voice.note(topic, messages.AGENT_STATUS, data, stamp)
+
+    def _say_farewell(self) -> None:
+        """Give everybody time to take in what was said last."""
+        if not self._first_counts or not self.context.ok():
+            return
+        until = time.monotonic() + FAREWELL
+        while time.monotonic() < until and not self._is_taken_in():
+            self._spin(RESEND_PERIOD)
+        self._note_statuses()
+        self._say_health()
+        self._voice.wait_until_heard(FAREWELL)
+        self._health.wait_for_all_acked(Duration(seconds=FAREWELL))
+
+    def _is_taken_in(self) -> bool:
+        played = 0 < self.settings.episodes <= self.num_finished
+        return not played or all(
+            self._statuses[player]["episodes"] >= self._first_counts[player] + self.num_finished
+            for player, seat in enumerate(self.roster.seats)
+            if seat.present
+        )
+
+    def _say_health(self) -> None:
+        now, seen = time.monotonic(), self.world.perceptions
+        recent = (self.num_cycles - self._health_cycles) / (now - self._health_at)
+        self._health_at, self._health_cycles = now, self.num_cycles
+        missing = self._missing() if self._is_running else ""
+        state = f"waits for {missing}" if missing else "plays" if self._is_running else "pauses"
+        figures = {
+            "episode": str(seen.episode[0]),
+            "cycle": str(seen.cycle[0]),
+            "cycles_per_second": f"{recent:.0f}",
+            "mean_cycles_per_second": f"{self.num_cycles / max(self._time_played, 1e-9):.1f}",
+        }
+        stamp = self.get_clock().now().to_msg()
+        self._health.publish(diagnostics(self._prefix, stamp, state, figures, self.roster.seats))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run a match until it is over or told to end (SIGINT, SIGTERM); then its bag is whole.
+
+    Raises:
+        SystemExit: it cannot play.
+    """
+    told: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, _: told.append(signum))
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        simulator = Simulator()
+        executor = EventsExecutor()  # the quick one
+        executor.add_node(simulator)
+        try:
+            simulator.play(lambda timeout: executor.spin_once(timeout), lambda: bool(told))
+        finally:
+            simulator.close()
+    except (KeepawayError, InvalidParameterTypeException) as error:
+        raise SystemExit(f"simulator: {error}") from error
+    finally:
+        rclpy.try_shutdown()

@@ -1,0 +1,75 @@
+"""What a simulator says: publishers of bytes, and a bag that gets the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+from visualization_msgs.msg import MarkerArray
+
+from keepaway_msgs.msg import Episode, FieldState, Match, Perception
+from keepaway_sim import messages
+from keepaway_sim.recording import BagWriter
+
+QUEUE = QoSProfile(depth=10)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+ALL = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Whoever counts episodes may come late."""
+TOPICS = {
+    "match": (Match, messages.MATCH, LATCHED),
+    "/clock": (Clock, messages.CLOCK, QUEUE),
+    "field_state": (FieldState, messages.FIELD_STATE, QUEUE),
+    "episode": (Episode, messages.EPISODE, ALL),
+    "markers": (MarkerArray, messages.MARKERS, QUEUE),
+}
+
+
+class Voice:
+    """Says messages, given as CDR bytes, on a node's topics and into a bag."""
+
+    def __init__(self, node: Node, player_names: tuple[str, ...], bag: BagWriter | None) -> None:
+        """Make a publisher for every topic; `bag` may be None."""
+        perceptions = {f"{name}/perception": _PERCEPTION for name in player_names}
+        self._bag = bag
+        self._publishers: dict[str, Publisher] = {}
+        self._types: dict[str, str] = {}
+        for topic, (message_class, message_type, qos) in (TOPICS | perceptions).items():
+            self._publishers[topic] = node.create_publisher(message_class, topic, qos)
+            self._types[topic] = message_type
+
+    def say(self, topic: str, data: bytes, time: int) -> None:
+        """Publish, and record as of `time` [simulated ns]."""
+        publisher = self._publishers[topic]
+        publisher.publish(data)
+        if self._bag is not None:
+            self._bag.write(publisher.topic_name, self._types[topic], data, time)
+
+    def repeat(self, topic: str, data: bytes) -> None:
+        """Publish what was said before."""
+        self._publishers[topic].publish(data)
+
+    def say_if_heard(self, topic: str, make: Callable[[], bytes], time: int) -> None:
+        """Make the message and say it, if somebody listens or a bag is written."""
+        if self._bag is not None or self._publishers[topic].get_subscription_count():
+            self.say(topic, make(), time)
+
+    def has_listeners(self, topic: str) -> bool:
+        """Does anybody listen?"""
+        return bool(self._publishers[topic].get_subscription_count())
+
+    def wait_until_heard(self, patience: float) -> None:
+        """Wait until what was said has arrived everywhere, at most so many seconds a topic."""
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(seconds=patience))
+
+    def note(self, topic: str, message_type: str, data: bytes, time: int) -> None:
+        """Record what somebody else said, if a bag is written; `topic` is its name in full."""
+        if self._bag is not None:
+            self._bag.write(topic, message_type, data, time)
+
+
+_PERCEPTION = (Perception, messages.PERCEPTION, QUEUE)

@@ -1,0 +1,102 @@
+"""Processes that belong together, as a match's nodes do: started, watched, ended as one. No ROS.
+
+Only processes that were started here are ever ended, by their ids. They do not hear the terminal's
+Ctrl-C, so that their starter decides in which order they end; and if the starter itself dies, the
+kernel tells them to end.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import NamedTuple, Self
+
+_PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None)
+
+
+class Ended(NamedTuple):
+    """A process that ended by itself."""
+
+    name: str
+    code: int  # its exit code, or minus the signal that ended it
+
+
+class Processes:
+    """Named processes. Use it in a `with`: when it is left, all of them have ended."""
+
+    def __init__(self, env: Mapping[str, str]) -> None:
+        """None yet; `env` is the environment of those to come."""
+        self._env = dict(env)
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """Those that have not been seen to end."""
+        return list(self._running)
+
+    def start(self, name: str, command: Sequence[str]) -> None:
+        """Start one.
+
+        Raises:
+            OSError: there is no such program.
+        """
+        self._running[name] = subprocess.Popen(
+            command,
+            env=self._env,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+            preexec_fn=_end_with_parent,
+        )
+
+    def pid(self, name: str) -> int:
+        """The id of a running one."""
+        return self._running[name].pid
+
+    def ended(self) -> list[Ended]:
+        """Those that have ended since they were asked for last."""
+        codes = {name: process.poll() for name, process in self._running.items()}
+        done = [Ended(name, code) for name, code in codes.items() if code is not None]
+        for name, _ in done:
+            del self._running[name]
+        return done
+
+    def stop(self, names: Sequence[str], patience: float) -> list[str]:
+        """End some: ask (SIGINT), wait so many seconds for all together, then kill.
+
+        Returns:
+            the names of those that had to be killed.
+        """
+        chosen = {name: self._running.pop(name) for name in names if name in self._running}
+        for process in chosen.values():
+            process.send_signal(signal.SIGINT)
+        until = time.monotonic() + patience
+        killed = []
+        for name, process in chosen.items():
+            try:
+                process.wait(max(0.0, until - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                killed.append(name)
+        return killed
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop(self.names, patience=5.0)
+
+
+def _end_with_parent() -> None:
+    """In the child: be told to end (SIGTERM) when the parent dies, however it dies."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
