@@ -14,6 +14,7 @@ Floating-point rules stay strict (no `fastmath`): sums have one order, and every
 same bits.
 """
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,12 +26,14 @@ def drop_stale_cache(package: Path) -> None:
     """Remove a package's cached machine code that is older than its newest source file.
 
     Numba looks at the source of the cached function alone, and would go on using machine code into
-    which an older version of another file was compiled.
+    which an older version of another file was compiled. (Several processes may do this at once.
+    The nodes below the package compile nothing.)
     """
-    newest = max(source.stat().st_mtime_ns for source in package.rglob("*.py"))
-    for cached in package.rglob("__pycache__/*.nb[ic]"):
-        if cached.stat().st_mtime_ns < newest:
-            cached.unlink(missing_ok=True)
+    newest = max(source.stat().st_mtime_ns for source in package.glob("*.py"))
+    for cached in package.glob("__pycache__/*.nb[ic]"):
+        with contextlib.suppress(FileNotFoundError):
+            if cached.stat().st_mtime_ns < newest:
+                cached.unlink()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
