@@ -66,14 +66,14 @@ class Processes:
         return done
 
     def stop(self, names: Sequence[str], patience: float) -> list[str]:
-        """End some: ask (SIGINT), wait so many seconds for all together, then kill.
+        """End some: ask (SIGTERM), wait so many seconds for all together, then kill.
 
         Returns:
             the names of those that had to be killed.
         """
         chosen = {name: self._running.pop(name) for name in names if name in self._running}
         for process in chosen.values():
-            process.send_signal(signal.SIGINT)
+            process.terminate()
         until = time.monotonic() + patience
         killed = []
         for name, process in chosen.items():

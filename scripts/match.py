@@ -1,0 +1,240 @@
+"""Play a match of ROS 2 nodes: the simulator and every player, each a process of its own.
+
+    .venv/bin/python scripts/match.py --task 3v2 --episodes 50 --keeper-policy learn
+    .venv/bin/python scripts/match.py --speed 1 --keeper-policy hand --record out/bag
+    .venv/bin/python scripts/match.py --keeper-policy greedy --load-weights out/weights --json
+    .venv/bin/python scripts/match.py --episodes 20 --keeper-agent "python my_keeper.py"
+
+Ctrl-C ends it with weights and bag whole. Give a second match on this machine another --domain or
+--namespace. With --json the last line of the output is one JSON object.
+"""
+
+import argparse
+import json
+import os
+import shlex
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from keepaway_agent.actions import Role
+from keepaway_agent.errors import AgentError
+from keepaway_agent.nodes.player import Player
+from keepaway_agent.policies import KEEPER_POLICIES, TAKER_POLICIES
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.nodes.scoreboard import Scoreboard
+from keepaway_sim.nodes.simulator import Simulator
+from keepaway_sim.options import ros_arguments
+from keepaway_sim.processes import Processes
+from keepaway_sim.task import Role as TaskRole
+from keepaway_sim.task import Task
+
+SCRIPTS = Path(__file__).resolve().parent
+START_TIMEOUT = 300.0  # [s] for everybody to come; so much because a first start compiles
+END_TIMEOUT = 15.0  # [s] for everybody to save and end
+MOST_UNHEARD = 1000  # messages that may still wait to be taken in at the end
+
+
+class MatchError(RuntimeError):
+    """A match that cannot be played (to its end)."""
+
+
+class Member(NamedTuple):
+    """One node of a match."""
+
+    name: str
+    program: str  # simulator, keeper or taker
+    arguments: list[str]  # ROS's
+
+
+def main() -> int:
+    """Play, say how it went."""
+    args = parse()
+    told: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, _: told.append(signum))
+    if args.domain is not None:
+        os.environ["ROS_DOMAIN_ID"] = str(args.domain)
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    executor = EventsExecutor()
+    try:
+        task = Task.parse(args.task, args.field)
+        check_files(args)
+        board = Scoreboard(args.episodes, namespace=args.namespace)
+        executor.add_node(board)
+        play = play_in_one_process if args.single_process else play_in_processes
+        play(args, members(args, task), board, executor, told)
+    except (AgentError, KeepawayError, MatchError, OSError) as error:
+        print(f"match: {error}", file=sys.stderr)
+        return 1
+    finally:
+        rclpy.try_shutdown()
+    board.conclude()
+    report(args, board.summary())
+    return 130 if told else 0
+
+
+def members(args: argparse.Namespace, task: Task) -> list[Member]:
+    """Every node of the match and how it is started."""
+    own = {"task", "field", "seed", "speed", "episodes", "profile", "visible_angle", "record"}
+    settings = {name: value for name, value in vars(args).items() if name in own}
+    settings["record_info"] = json.dumps({"command": shlex.join(sys.argv)})
+    return [
+        Member("simulator", "simulator", arguments_of("simulator", args, settings)),
+        *(member(args, name, task.role(p)) for p, name in enumerate(task.player_names)),
+    ]
+
+
+def member(args: argparse.Namespace, name: str, role: TaskRole) -> Member:
+    """A player's node."""
+    program = role.name.lower()
+    policy = getattr(args, f"{program}_policy")
+    settings: dict[str, object] = {"policy": policy, "resume": args.resume}
+    if policy in ("learn", "greedy") and args.load_weights:
+        settings["load_weights"] = str(args.load_weights.absolute() / f"{name}.npz")
+    if policy == "learn" and args.save_weights:
+        settings["save_weights"] = str(args.save_weights.absolute() / f"{name}.npz")
+    return Member(name, program, arguments_of(name, args, settings))
+
+
+def arguments_of(name: str, args: argparse.Namespace, settings: dict[str, object]) -> list[str]:
+    """A node's name, namespace and parameters, as ROS arguments."""
+    clock = {"/clock": f"{args.namespace}/clock"} if args.namespace else {}
+    made = ros_arguments(settings, name, args.namespace, clock)
+    return [*made, "--log-level", "info" if args.verbose else "warn"]
+
+
+def check_files(args: argparse.Namespace) -> None:
+    """Refuse to write over what is there, before anything is started."""
+    if args.record and Path(args.record).exists():
+        raise MatchError(f"--record {args.record} is there already: name another folder")
+    if args.save_weights and not args.resume and list(args.save_weights.glob("*.npz")):
+        raise MatchError(
+            f"--save-weights {args.save_weights} has weights already: name another folder, or"
+            " --resume to go on from them"
+        )
+
+
+def play_in_one_process(
+    args: argparse.Namespace,
+    team: list[Member],
+    board: Scoreboard,
+    executor: Executor,
+    told: list[int],
+) -> None:
+    """All nodes here, taking turns."""
+    options = [{"cli_args": each.arguments, "use_global_arguments": False} for each in team]
+    simulator = Simulator(**options[0])
+    players = [
+        Player(Role[each.program.upper()], **option)
+        for each, option in zip(team[1:], options[1:], strict=True)
+    ]
+    for node in (simulator, *players):
+        executor.add_node(node)
+
+    def spin(timeout: float) -> None:
+        executor.spin_once(timeout)
+        board.show()
+
+    try:
+        simulator.play(spin, lambda: bool(told))
+    finally:
+        simulator.close()
+        for player in players:
+            player.save()
+
+
+def play_in_processes(
+    args: argparse.Namespace,
+    team: list[Member],
+    board: Scoreboard,
+    executor: Executor,
+    told: list[int],
+) -> None:
+    """Every node its own process; ends when the simulator's does."""
+    with Processes(os.environ) as processes:
+        for each in team:
+            processes.start(each.name, [*program(args, each.program), *each.arguments])
+        started = time.monotonic()
+        while not told and "simulator" in processes.names:
+            executor.spin_once(0.1)
+            board.show()
+            for name, code in processes.ended():
+                handle_end(args, name, code, board)
+            if not board.has_begun and time.monotonic() - started > START_TIMEOUT:
+                raise MatchError(f"nothing began within {START_TIMEOUT:.0f} s: {board.state}")
+        processes.stop(["simulator"], END_TIMEOUT)
+        for name in processes.stop(processes.names, END_TIMEOUT):
+            print(f"match: {name} did not end and was killed", file=sys.stderr)
+    for _ in range(MOST_UNHEARD):
+        executor.spin_once(0.0)
+
+
+def handle_end(args: argparse.Namespace, name: str, code: int, board: Scoreboard) -> None:
+    """A process has ended by itself."""
+    if name == "simulator":
+        if code:
+            raise MatchError(f"the simulator ended with code {code}")
+    elif not board.has_begun:
+        raise MatchError(f"{name} is missing: its process ended with code {code}")
+    else:
+        print(f"match: {name} ended with code {code}; it is missing now", file=sys.stderr)
+
+
+def program(args: argparse.Namespace, name: str) -> list[str]:
+    """The command that starts a node of this kind."""
+    own = getattr(args, f"{name}_agent", None)
+    if not own:
+        return [sys.executable, str(SCRIPTS / f"{name}.py")]
+    words = shlex.split(own)
+    return [sys.executable, *words] if words[0].endswith(".py") else words
+
+
+def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
+    """Say how it went."""
+    mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))
+    if mean is not None:
+        spread = "" if sem is None else f" +- {sem:.2f}"
+        print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
+    if args.json:
+        print(json.dumps({"task": args.task, "seed": args.seed, **summary}))
+
+
+def parse() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("--task", default="3v2", help="keepers v takers (default 3v2)")
+    add("--episodes", type=int, default=0, help="to play; 0 (default): until Ctrl-C")
+    add("--keeper-policy", choices=list(KEEPER_POLICIES), default="hand")
+    add("--taker-policy", choices=list(TAKER_POLICIES), default="hand")
+    add("--seed", type=int, default=0, help="every random number follows from it (default 0)")
+    add("--speed", type=float, default=0.0, help="1 is real time; 0 (default): lock-step")
+    add("--field", default="25x25", help="length x width in metres (default 25x25)")
+    add("--visible-angle", type=float, default=360.0, help="of players [deg] (default 360)")
+    add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
+    add("--record", default="", metavar="DIR", help="write a bag of everything that is said")
+    add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
+    add("--load-weights", type=Path, metavar="DIR", help="where learned players read NAME.npz")
+    add("--resume", action="store_true", help="go on from the weights in --save-weights")
+    add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
+    add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")
+    add("--single-process", action="store_true", help="all nodes in this process: quicker")
+    add("--namespace", default="", help="of all nodes and topics, like /match_2")
+    add("--domain", type=int, help="ROS domain (default: that of the environment)")
+    add("--verbose", action="store_true", help="let the nodes tell what they do")
+    add("--json", action="store_true", help="end with one JSON object")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,231 @@
+"""The node of one player, keeper or taker: wiring around `agent.Agent`.
+
+The node's name is the player's name, "keeper_1"; its topics and services begin with it. It learns
+from the latched `match` what is played, says on its `status` that it is ready until the first
+perception comes, and answers perceptions.
+"""
+
+import signal
+from dataclasses import dataclass, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from keepaway_agent.actions import Outcome, Role
+from keepaway_agent.agent import Agent, AgentConfig, check_config
+from keepaway_agent.errors import AgentError
+from keepaway_agent.nodes import conversions
+from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
+from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
+from keepaway_msgs.srv import LoadWeights, SaveWeights
+
+QUEUE = QoSProfile(depth=10)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+ANNOUNCEMENT_PERIOD = (
+    0.5  # [s] a first message may be lost although the nodes have found each other
+)
+PATIENCE = 0.25  # [s] at most, from being told to end to ending
+LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
+FIXED = ParameterDescriptor(read_only=True)
+
+
+@dataclass(frozen=True)
+class Files:
+    """A player's parameters about its weights."""
+
+    load_weights: str = ""  # file to start from; empty: know nothing
+    save_weights: str = ""  # file to write at the end; empty: none
+    save_every: int = 100  # [episodes] and in between; 0: at the end only
+    resume: bool = False  # go on from save_weights if that file is there already
+
+
+class Player(Node):
+    """One player of a match, alive before and after it.
+
+    Attributes:
+        agent: the player in the match that is on; None until there is one.
+    """
+
+    def __init__(self, role: Role, **node_options: Any) -> None:
+        """Wait for a match.
+
+        Args:
+            role: its team.
+            node_options: for `rclpy.node.Node`.
+
+        Raises:
+            AgentError: parameters that make no player, or weights that cannot be read.
+        """
+        super().__init__(f"{role.name.lower()}_1", **node_options)
+        self.agent: Agent | None = None
+        self._role = role
+        self._config = AgentConfig(**self._declare(AgentConfig))
+        check_config(role, self._config)
+        files = Files(**self._declare(Files))
+        self._save_every = files.save_every
+        self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
+        self._start_weights = self._weights_to_start_from(files)
+        name = self.get_name()
+        self._request = ActionRequest()
+        self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", QUEUE)
+        self._status = self.create_publisher(AgentStatus, f"{name}/status", LATCHED)
+        self.create_subscription(Match, "match", self._on_match, LATCHED)
+        self.create_subscription(Perception, f"{name}/perception", self._on_perception, QUEUE)
+        self.create_service(SaveWeights, f"{name}/save_weights", self._on_save)
+        self.create_service(LoadWeights, f"{name}/load_weights", self._on_load)
+        self._announcement = self.create_timer(ANNOUNCEMENT_PERIOD, self._announce)
+
+    def save(self) -> None:
+        """Write what it has learned, where the parameter `save_weights` says so.
+
+        Raises:
+            WeightsError: the file cannot be written.
+        """
+        if self.agent and self._weights_path:
+            save_weights(self._weights_path, self._learned(), overwrite=True)
+
+    def _learned(self) -> LearnedWeights:
+        if self.agent is None:
+            raise AgentError("no match yet, so nothing has been learned")
+        return self.agent.learned(self.get_name())
+
+    def _declare(self, settings: type) -> dict[str, Any]:
+        """Declare a parameter for every field of a dataclass; their values by name."""
+        return {
+            field.name: self.declare_parameter(field.name, field.default, FIXED).value
+            for field in fields(settings)
+        }
+
+    def _weights_to_start_from(self, files: Files) -> LearnedWeights | None:
+        """Its own saved ones to resume from, or others, or none."""
+        own = self._weights_path
+        if own is None or not own.exists():
+            return load_weights(Path(files.load_weights)) if files.load_weights else None
+        if not files.resume:
+            raise AgentError(f"save_weights={own}: is there already; resume:=true goes on from it")
+        return load_weights(own)
+
+    def _on_match(self, match: Match) -> None:
+        """Take the own place in a new match, with what was learned before."""
+        name = self.get_name()
+        if name not in match.player_names:
+            self.get_logger().error(
+                f"no place for {name} in a match of {', '.join(match.player_names)}"
+            )
+            return
+        agent = Agent(conversions.match_facts(match), match.player_names.index(name), self._config)
+        if agent.role != self._role:
+            raise AgentError(f"{name} is a {agent.role.name.lower()}'s name in this match")
+        known = self.agent.learned(name) if self.agent else self._start_weights
+        if known:
+            agent.use(known)
+        elif self._config.policy == "greedy":
+            self.get_logger().warning("greedy without load_weights: it will choose at random")
+        self.agent = agent
+        self.get_logger().info(f"plays {match.task} as {self._config.policy}, seed {match.seed}")
+        self._announce()
+
+    def _announce(self) -> None:
+        agent = self.agent
+        self._status.publish(
+            AgentStatus(
+                player_index=agent.index if agent else 0,
+                name=self.get_name(),
+                policy=self._config.policy,
+                learning=agent.learns if agent else False,
+                ready=agent is not None,
+                episodes=agent.episodes if agent else 0,
+                simulated_hours=agent.hours if agent else 0.0,
+                code_version=version("keepaway_agent"),
+            )
+        )
+
+    def _on_perception(self, message: Perception) -> None:
+        agent = self.agent
+        if agent is None:
+            return
+        try:
+            perceived = conversions.perceived(message, agent)
+        except AgentError as error:
+            self.get_logger().warning(f"ignored: {error}", throttle_duration_sec=LOG_PERIOD)
+            return
+        self._announcement.cancel()
+        num_ended = agent.episodes + agent.cut_off
+        decision = agent.perceive(perceived)
+        if decision:
+            conversions.write_request(self._request, message, decision)
+            self._requests.publish(self._request)
+        if agent.episodes + agent.cut_off > num_ended:
+            self._after_episode(agent, message.outcome)
+
+    def _after_episode(self, agent: Agent, outcome: int) -> None:
+        if outcome == Outcome.IN_PLAY:
+            self.get_logger().warning("the end of an episode was never perceived")
+        self._announce()
+        if self._save_every > 0 and agent.episodes % self._save_every == 0:
+            self.save()
+
+    def _on_save(
+        self, request: SaveWeights.Request, response: SaveWeights.Response
+    ) -> SaveWeights.Response:
+        path = Path(request.path) if request.path else self._weights_path
+        try:
+            if path is None:
+                raise AgentError("no path was given, and save_weights is not set")
+            save_weights(path, self._learned(), overwrite=path == self._weights_path)
+        except AgentError as error:
+            response.message = str(error)
+            return response
+        response.success, response.path = True, str(path)
+        response.message = f"{self.get_name()} saved its weights"
+        return response
+
+    def _on_load(
+        self, request: LoadWeights.Request, response: LoadWeights.Response
+    ) -> LoadWeights.Response:
+        path = Path(request.path) if request.path else self._weights_path
+        try:
+            if path is None:
+                raise AgentError("no path was given, and save_weights is not set")
+            if self.agent is None:
+                raise AgentError("no match yet, so it is not known which weights would fit")
+            self.agent.use(load_weights(path))
+        except AgentError as error:
+            response.message = str(error)
+            return response
+        response.success, response.path = True, str(path)
+        response.message = f"{self.get_name()} goes on from them"
+        return response
+
+
+def main(role: Role, args: list[str] | None = None) -> None:
+    """Run one player until it is told to end (SIGINT, SIGTERM); then its weights are saved.
+
+    Signals only leave word: nothing is interrupted halfway.
+
+    Raises:
+        SystemExit: it cannot play.
+    """
+    told: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, _: told.append(signum))
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        player = Player(role)
+        executor = EventsExecutor()  # the quick one
+        executor.add_node(player)
+        while not told:
+            executor.spin_once(timeout_sec=PATIENCE)
+        player.save()
+    except (AgentError, InvalidParameterTypeException) as error:
+        raise SystemExit(f"{role.name.lower()}: {error}") from error
+    finally:
+        rclpy.try_shutdown()

@@ -1,0 +1,9 @@
+"""The taker's node; see `player`."""
+
+from keepaway_agent.actions import Role
+from keepaway_agent.nodes import player
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run one taker."""
+    player.main(Role.TAKER, args)
