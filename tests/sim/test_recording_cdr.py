@@ -122,6 +122,12 @@ def test_many_messages_are_written_and_read_at_once() -> None:
     assert PERCEPTION.lengths(one_by_one[0]) == lengths
 
 
+def test_messages_are_whole_words_as_they_arrive_over_dds() -> None:
+    lengths = {"positions": 12, "velocities": 12, "ages": 6, "cycles_to_ball": 5}
+    assert len(PERCEPTION.empty(1, lengths)[0].tobytes()) == 284
+    assert len(PERCEPTION.encode({"cycles_to_ball": [1]})) % 4 == 0
+
+
 def test_a_definition_of_another_age_is_read_by_its_own_text() -> None:
     old = codec("keepaway_msgs/msg/Episode", "uint32 number  # counts from 0\nfloat32 hold_time\n")
     assert old.decode(old.encode({"number": 5, "hold_time": 0.5})) == {

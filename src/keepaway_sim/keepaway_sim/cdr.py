@@ -117,9 +117,7 @@ class Codec:
             offsets.append(position)
             position += np.dtype(format_).itemsize
         size = size or _aligned(position, PAYLOAD)
-        return np.dtype(
-            {"names": names, "formats": formats, "offsets": offsets, "itemsize": size}
-        )
+        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
     def lengths(self, values: Mapping[str, Any]) -> dict[str, int]:
         """The lengths of a decoded message's sequences, for `dtype`."""

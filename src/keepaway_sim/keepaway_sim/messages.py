@@ -11,7 +11,7 @@ import functools
 import json
 import struct
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from keepaway_sim.config import CYCLE_TIME
 from keepaway_sim.markers import field_markers
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
-from keepaway_sim.world import World
+
+if TYPE_CHECKING:  # nodes that pass messages on need no world
+    from keepaway_sim.world import World
 
 MATCH = "keepaway_msgs/msg/Match"
 PERCEPTION = "keepaway_msgs/msg/Perception"

@@ -1,4 +1,4 @@
-"""When which message of a bag is to be said again: rate, pause, step, loop. No ROS, no clock of its own.
+"""When which message of a bag is due again: rate, pause, step, loop. No ROS, no own clock.
 
 Time in a bag is simulated; `now` is any clock's time [s] that the caller keeps passing in.
 """

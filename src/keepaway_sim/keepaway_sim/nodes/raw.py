@@ -12,7 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.recording import Qos
 
-
 Settings = TypeVar("Settings")
 
 
@@ -64,7 +63,7 @@ def to_profile(qos: Qos, depth: int) -> QoSProfile:
 
 
 def offered_qos(node: Node, topic: str, otherwise: Qos) -> Qos:
-    """How a topic's publisher offers it. (Its depth is nobody's business, so nobody is told.)"""
+    """How a topic's publisher offers it; its depth is not told to anybody, so not known here."""
     publishers = node.get_publishers_info_by_topic(topic)
     if not publishers:
         return otherwise

@@ -1,4 +1,4 @@
-"""The recorder's node: everything that is said in a match, into a bag, with a count of what is missing.
+"""The recorder's node: what is said in a match, into a bag, with a count of what is missing.
 
 It does not spin: two hundred times a second it takes all that came from its subscriptions, as
 bytes. That costs a fraction of a callback for each message, and deep histories keep what comes in
@@ -7,7 +7,6 @@ between. The simulator can wait for it: `recorded` says which simulated time it 
 
 import json
 import signal
-import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from typing import Any
 import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -219,7 +219,7 @@ def _never_called(message: bytes) -> None:
     """Messages are taken by `poll`."""
 
 
-def main(args: Sequence[str] | None = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM.
 
     Returns:
@@ -232,7 +232,7 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         recorder = Recorder()
     except (KeepawayError, InvalidParameterTypeException) as error:
-        print(f"recorder: {error}", file=sys.stderr)
+        get_logger("recorder").error(str(error))
         return 2
     recorder.get_logger().info(f"records to {recorder.bag.path}")
     while not stop.wait(POLL_PERIOD):

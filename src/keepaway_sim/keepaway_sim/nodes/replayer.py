@@ -4,9 +4,8 @@ Names in the bag are taken relative to the node's namespace, so `-r __ns:=/again
 match; only /clock stays where it is.
 """
 
-import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -183,7 +183,7 @@ def _range(text: str) -> tuple[int, int]:
         raise KeepawayError(f"episodes={text!r}: write 7 or 3-9") from None
 
 
-def main(args: Sequence[str] | None = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Play a bag.
 
     Returns:
@@ -198,7 +198,7 @@ def main(args: Sequence[str] | None = None) -> int:
         replayer.linger()
         replayer.get_logger().info(f"said {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
-        print(f"replayer: {error}", file=sys.stderr)
+        get_logger("replayer").error(str(error))
         return 2
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

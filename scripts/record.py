@@ -1,0 +1,28 @@
+"""Record a match that is on, as a node of its own, until Ctrl-C.
+
+    .venv/bin/python scripts/record.py out/bag
+    .venv/bin/python scripts/record.py out/bag --compression lz4 --ros-args -r __ns:=/match_2
+
+It ends with 1 if a cycle is missing, and says of which topic. (To record at full speed let the
+simulator write the bag: scripts/match.py --record.) What follows --ros-args goes to the node.
+"""
+
+import argparse
+import sys
+
+from keepaway_sim.nodes.recorder import Settings, main
+from keepaway_sim.options import add_options, parse_node_arguments
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    made.add_argument("path", metavar="BAG", help="folder to make")
+    add_options(made, Settings, without=("path",))
+    return made
+
+
+if __name__ == "__main__":
+    sys.exit(main(parse_node_arguments(parser(), sys.argv[1:])))

@@ -1,0 +1,101 @@
+"""Play a recorded match again, onto the topics that it was recorded from.
+
+    .venv/bin/python scripts/replay.py out/bag
+    .venv/bin/python scripts/replay.py out/bag --rate 4 --episodes 3-5 --loop true
+    .venv/bin/python scripts/replay.py out/bag --topics match,keeper_1/perception
+
+In a terminal the space bar pauses, the right arrow or . goes one cycle on, + and - change the
+rate, and q ends it. With the last line a keeper's node (scripts/keeper.py) answers what it would
+have done. What follows --ros-args goes to the node: -r __ns:=/again plays it in a namespace.
+"""
+
+import argparse
+import select
+import sys
+import termios
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import rclpy
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.messages import SECOND
+from keepaway_sim.nodes.replayer import Replayer, Settings
+from keepaway_sim.options import add_options, parse_node_arguments
+from keepaway_sim.playback import Playback
+
+
+def main() -> int:
+    """Play it."""
+    rclpy.init(args=parse_node_arguments(parser(), sys.argv[1:]))
+    executor = EventsExecutor()
+    try:
+        replayer = Replayer()
+        executor.add_node(replayer)
+        with keys(replayer.playback) as obey:
+
+            def spin(seconds: float) -> None:
+                executor.spin_once(timeout_sec=seconds)
+                obey()
+
+            count = replayer.play(spin)
+        replayer.linger()
+        print(f"said {count} messages")
+    except (KeepawayError, InvalidParameterTypeException) as error:
+        print(f"replay: {error}", file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+@contextmanager
+def keys(playback: Playback) -> Iterator[Callable[[], None]]:
+    """Let the keyboard rule a playback while the block lasts; without a terminal nothing does."""
+    if not sys.stdin.isatty():
+        yield lambda: None
+        return
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield lambda: obey_key(playback)
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+        print()
+
+
+def obey_key(playback: Playback) -> None:
+    """Do what the last key asks for, and show where the playback is."""
+    key = ""
+    while select.select([sys.stdin], [], [], 0)[0]:
+        key += sys.stdin.read(1)
+    if key == " ":
+        (playback.resume if playback.paused else playback.pause)()
+    elif key in (".", "\x1b[C"):
+        playback.step()
+    elif key in ("+", "-"):
+        playback.rate = playback.rate * (2.0 if key == "+" else 0.5)
+    elif key == "q":
+        raise KeyboardInterrupt
+    state = "paused" if playback.paused else f"x {playback.rate:g}"
+    print(f"\r{playback.time / SECOND:9.1f} s  {state:8}", end="", flush=True)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    made.add_argument("path", metavar="BAG", help="folder of the bag")
+    add_options(made, Settings, without=("path",))
+    return made
+
+
+if __name__ == "__main__":
+    sys.exit(main())
