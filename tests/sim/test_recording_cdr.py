@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -65,6 +65,7 @@ def test_a_request_is_laid_out_as_worked_out_by_hand() -> None:
     assert data == by_hand
 
 
+@settings(deadline=None)
 @given(PERCEPTIONS)
 def test_perceptions_are_read_by_ros_as_they_were_written(fields: dict[str, Any]) -> None:
     message = deserialize_message(PERCEPTION.encode(fields), keepaway_msgs.msg.Perception)
@@ -76,12 +77,14 @@ def test_perceptions_are_read_by_ros_as_they_were_written(fields: dict[str, Any]
         assert list(getattr(message, name)) == fields[name]
 
 
+@settings(deadline=None)
 @given(MATCHES)
 def test_what_ros_writes_is_read_back(fields: dict[str, Any]) -> None:
     data = serialize_message(keepaway_msgs.msg.Match(**fields))
     assert codec("keepaway_msgs/msg/Match").decode(data).items() >= fields.items()
 
 
+@settings(deadline=None)
 @given(MATCHES)
 def test_strings_are_written_as_ros_reads_them(fields: dict[str, Any]) -> None:
     match = deserialize_message(
