@@ -311,6 +311,31 @@ def accelerate_ball(c, s, f, p, want_x, want_y):
 
 
 @njit(cache=True)
+def rank_of(c, s, f, p, keeper):
+    """How many other keepers player p believes closer to itself than `keeper`."""
+    own = s.position[f, p, p]
+    x, y = s.position[f, p, keeper]
+    away = math.hypot(x - own[0], y - own[1])
+    rank = 0
+    for j in range(c.num_keepers):
+        if j == p or j == keeper:
+            continue
+        other = math.hypot(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        if other < away or (other == away and j < keeper):
+            rank += 1
+    return rank
+
+
+@njit(cache=True)
+def keeper_of_rank(c, s, f, p, rank):
+    """The keeper that player p believes to be of this rank by distance, 0 the closest."""
+    for j in range(c.num_keepers):
+        if j != p and rank_of(c, s, f, p, j) == rank:
+            return j
+    return p
+
+
+@njit(cache=True)
 def pass_speed(c, distance, end_speed):
     """First speed of a ball that covers `distance` and then has `end_speed` (whole cycles)."""
     growth = 1.0 / c.ball_decay

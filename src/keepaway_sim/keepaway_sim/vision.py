@@ -75,6 +75,7 @@ class Memory(NamedTuple):
     turned: np.ndarray  # (F, P) [rad] own turn expected of the last command
     kicked: np.ndarray  # (F, P) bool: the last command kicked the ball
     pass_cycle: np.ndarray  # (F, P) int64 cycle of the last fresh pass decision
+    pass_rank: np.ndarray  # (F, P) int64 receiver's rank by distance then, 0 the closest
     intercept_cycle: np.ndarray  # (F, P) int64 cycle in which the ball is to be met
     intercept_point: np.ndarray  # (F, P, 2) [m] and where
     search_cycle: np.ndarray  # (F, P) int64 last cycle of a search
@@ -122,6 +123,7 @@ def make_memory(num_fields: int, num_players: int) -> Memory:
         turned=np.zeros(shape),
         kicked=np.zeros(shape, dtype=np.bool_),
         pass_cycle=np.full(shape, -2, dtype=np.int64),
+        pass_rank=np.zeros(shape, dtype=np.int64),
         intercept_cycle=np.full(shape, -10, dtype=np.int64),
         intercept_point=np.zeros((*shape, 2)),
         search_cycle=np.full(shape, -10, dtype=np.int64),

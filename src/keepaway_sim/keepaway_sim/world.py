@@ -253,11 +253,13 @@ def _act(c, state, s, m, speech, motion, place, action, target, uniforms, cursor
 
 @njit(cache=True)
 def _take_request(c, state, s, m, f, p, action, target):
-    if not s.decision_due[f, p]:
-        return
-    state.action[f, p], state.target[f, p] = action, target
-    if action == _PASS and s.ball_kickable[f, p]:
-        m.pass_cycle[f, p] = s.cycle[f]
+    if s.decision_due[f, p]:
+        state.action[f, p], state.target[f, p] = action, target
+        if action == _PASS and s.ball_kickable[f, p]:
+            m.pass_cycle[f, p] = s.cycle[f]
+            m.pass_rank[f, p] = skills.rank_of(c, s, f, p, target)
+    elif c.pass_by_rank and state.action[f, p] == _PASS:
+        state.target[f, p] = skills.keeper_of_rank(c, s, f, p, m.pass_rank[f, p])
 
 
 @njit(cache=True)

@@ -111,6 +111,7 @@ class Simulator(Node):
         self.world = World(task, self._declare_config())
         seeds = np.random.SeedSequence(self.settings.seed, spawn_key=(0, WORLD_STREAM))
         self.world.start(0, seeds)
+        compile_world(task, self.world.config)
         self.roster = Roster(task, self.world.config)
         self.num_finished = self.num_cycles = 0
         self._is_running, self._is_reset = self.settings.autostart, False
@@ -376,6 +377,13 @@ class Simulator(Node):
         }
         stamp = self.get_clock().now().to_msg()
         self._health.publish(diagnostics(self._prefix, stamp, state, figures, self.roster.seats))
+
+
+def compile_world(task: Task, config: Config) -> None:
+    """Play one cycle on another field, so that the first cycle of the match is not late."""
+    world = World(task, config)
+    world.start(0, np.random.SeedSequence(0))
+    world.step(world.state.action, world.state.target)
 
 
 def main(args: list[str] | None = None) -> None:
