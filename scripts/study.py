@@ -1,0 +1,109 @@
+"""Run a study: the paper's Table 2 and the other experiments, or one of your own.
+
+    .venv/bin/python scripts/study.py tiny --out results/tiny
+    .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2
+    .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2 --resume
+    .venv/bin/python scripts/study.py mine.toml --scheduler tcp://cluster:8786 --out results/mine
+
+It can be stopped at any moment and gone on with (--resume). scripts/analyze.py makes the report.
+"""
+
+import argparse
+import dataclasses
+import logging
+import multiprocessing
+import os
+import shlex
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from tqdm import tqdm
+
+from keepaway_agent.errors import AgentError
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.version import code_version
+from keepaway_transfer.batch import NUM_FIELDS, play
+from keepaway_transfer.experiment import Progress, run
+from keepaway_transfer.results import open_results
+from keepaway_transfer.study import Study, load_study
+
+log = logging.getLogger("study")
+
+
+def main() -> int:
+    """Run what is left of the study; a refusal is one line."""
+    arguments = _parse()
+    logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s")
+    try:
+        study = load_study(arguments.study)
+        if arguments.trials:
+            study = dataclasses.replace(study, trials=arguments.trials)
+        _run(study, arguments)
+    except (AgentError, KeepawayError, OSError) as error:
+        print(f"study: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _run(study: Study, arguments: argparse.Namespace) -> None:
+    with (
+        open_results(
+            arguments.out,
+            study,
+            command=shlex.join(["scripts/study.py", *sys.argv[1:]]),
+            code_version=code_version(),
+            resume=arguments.resume,
+            any_code=arguments.any_code,
+        ) as results,
+        _executor(arguments) as executor,
+    ):
+        progress = Progress(study, results.done)
+        with tqdm(total=progress.trials, initial=progress.done, disable=None, unit="trial") as bar:
+            play_some = partial(play, num_fields=arguments.fields)
+            for trial in run(study, results, executor, play_some, arguments.batch):
+                progress.add(trial)
+                bar.update()
+                if bar.disable:
+                    log.info("%s", progress)
+    print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
+
+
+@contextmanager
+def _executor(arguments: argparse.Namespace) -> Iterator[Executor]:
+    """Processes of this machine, or the workers of a Dask scheduler."""
+    if arguments.scheduler:
+        from distributed import Client  # only a cluster needs it
+
+        with Client(arguments.scheduler) as client, client.get_executor() as executor:
+            yield executor
+    else:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(arguments.workers, mp_context=context) as executor:
+            yield executor
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("study", help="a study of the package, or the path of a TOML file")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument("--trials", type=int, help="trials a row; default the study's")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, instead of processes")
+    parser.add_argument("--batch", type=int, default=2 * NUM_FIELDS, help="trials played together")
+    parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="of them in lock-step")
+    parser.add_argument("--resume", action="store_true", help="go on with results that are there")
+    parser.add_argument("--any-code", action="store_true", help="also if the code has changed")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
