@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim import messages
-from keepaway_sim.config import Config
+from keepaway_sim.config import CYCLE_TIME, Config
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import (
     ACTION_REQUEST,
@@ -134,6 +134,7 @@ class Track(NamedTuple):
     """
 
     time: np.ndarray  # (T,) int64 [ns] simulated
+    outcome: np.ndarray  # (T,) IN_PLAY but in the last row
     cycle: np.ndarray  # (T,) since kick-off
     position: np.ndarray  # (T, P + 1, 2) [m] truth
     velocity: np.ndarray  # (T, P + 1, 2) [m/s] truth
@@ -214,37 +215,46 @@ class MatchBag:
                     lost_by=int(entry["lost_by"]),
                 )
 
+    def unfinished(self) -> EpisodeSummary | None:
+        """The episode that was being played when the recording ended, if there was one."""
+        since = self.reader.end_time - SECOND
+        last = None
+        for batch in self.reader.batches([self.topic("field_state")], since):
+            last = batch.data[-1]
+        if last is None or last["outcome"] != Outcome.IN_PLAY:
+            return None
+        end = int(last["stamp.sec"]) * SECOND + int(last["stamp.nanosec"])
+        cycles = int(last["cycle"])
+        return EpisodeSummary(
+            int(last["episode"]), end - cycles * CYCLE_NS, end, cycles,
+            cycles * CYCLE_TIME, Outcome.IN_PLAY, -1,
+        )  # fmt: skip
+
     def track(self, episode: EpisodeSummary) -> Track:
         """One episode's whole course."""
         return self.tracks(episode.start, episode.end)
 
     def tracks(self, start: int, end: int) -> Track:
         """What was recorded of start <= simulated time <= end [ns]."""
-        states = self._batches([self.topic("field_state")], start, end)
+        said: dict[str, list[np.ndarray]] = {self.topic("field_state"): []}
+        for name in ("perception", "action_request"):
+            said |= {topic: [] for topic in self.player_topics(name)}
+        for batch in self.reader.batches(said, start, end + 1):
+            said[batch.topic].append(batch.data)
+        states = said[self.topic("field_state")]
         if not states:
             raise KeepawayError(f"{self.reader.path}: no field states from {start} to {end} ns")
-        state = _joined([batch.data for batch in states])
-        time = _stamps(state)
-        track = _empty_track(time, state, self.task)
-        rows = {int(moment): row for row, moment in enumerate(time)}
+        state = np.concatenate(states)
+        track = _empty_track(state, self.task)
+        moments = {key: row for row, key in enumerate(_moments(state))}
+        cycles = {key[1:]: row for key, row in moments.items()}
         for player, topic in enumerate(self.player_topics("perception")):
-            for batch in self._batches([topic], start, end):
-                _add_perceptions(track, rows, player, batch.data)
-        keys = {
-            (int(e), int(c)): row
-            for row, (e, c) in enumerate(zip(state["episode"], state["cycle"], strict=True))
-        }
+            for data in said[topic]:
+                _add_perceptions(track, moments, player, data)
         for player, topic in enumerate(self.player_topics("action_request")):
-            for batch in self._batches([topic], start, end):
-                _add_requests(track, keys, player, batch.data)
+            for data in said[topic]:
+                _add_requests(track, cycles, player, data)
         return track
-
-    def _batches(self, topics: list[str], start: int, end: int) -> list[Any]:
-        return list(self.reader.batches(topics, start, end + 1))
-
-
-def _joined(parts: list[np.ndarray]) -> np.ndarray:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _stamps(data: np.ndarray) -> np.ndarray:
@@ -252,10 +262,17 @@ def _stamps(data: np.ndarray) -> np.ndarray:
     return time
 
 
-def _empty_track(time: np.ndarray, state: np.ndarray, task: Task) -> Track:
-    count, num = len(time), task.num_players
+def _moments(data: np.ndarray) -> list[tuple[bool, int, int]]:
+    """What tells two cycles apart: an episode that was aborted shows its last cycle twice."""
+    ended = (data["outcome"] != Outcome.IN_PLAY).tolist()
+    return list(zip(ended, data["episode"].tolist(), data["cycle"].tolist(), strict=True))
+
+
+def _empty_track(state: np.ndarray, task: Task) -> Track:
+    count, num = len(state), task.num_players
     return Track(
-        time=time,
+        time=_stamps(state),
+        outcome=state["outcome"].astype(np.int64),
         cycle=state["cycle"].astype(np.int64),
         position=state["positions"].reshape(count, num + 1, 2).copy(),
         velocity=state["velocities"].reshape(count, num + 1, 2).copy(),
@@ -271,18 +288,20 @@ def _empty_track(time: np.ndarray, state: np.ndarray, task: Task) -> Track:
     )
 
 
-def _add_perceptions(track: Track, rows: dict[int, int], player: int, data: np.ndarray) -> None:
-    at = np.array([rows.get(int(moment), -1) for moment in _stamps(data)])
+def _add_perceptions(
+    track: Track, moments: dict[tuple[bool, int, int], int], player: int, data: np.ndarray
+) -> None:
+    at = np.array([moments.get(moment, -1) for moment in _moments(data)])
     data, at = data[at >= 0], at[at >= 0]
     track.believed[at, player] = data["positions"].reshape(len(at), -1, 2)
     track.age[at, player] = data["ages"]
 
 
 def _add_requests(
-    track: Track, keys: dict[tuple[int, int], int], player: int, data: np.ndarray
+    track: Track, cycles: dict[tuple[int, int], int], player: int, data: np.ndarray
 ) -> None:
     answered = zip(data["episode"].tolist(), data["cycle"].tolist(), strict=True)
-    at = np.array([keys.get(key, -1) for key in answered])
+    at = np.array([cycles.get(cycle, -1) for cycle in answered])
     data, at = data[at >= 0], at[at >= 0]
     track.requested[at, player] = data["action"]
     track.requested_target[at, player] = data["target"]

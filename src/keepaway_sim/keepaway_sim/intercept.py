@@ -8,33 +8,34 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 
+from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import clip, rolling, wrap
+from keepaway_sim.geometry import clip, length, rolling, wrap
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
 SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
+STILL = 0.01  # [m/cycle] a slower ball lies still
 BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
-@njit(cache=True, inline="always")
+@compiled
 def dash_power(c, along, speed_along, cycles):
     """Power of the dash that covers `along` metres ahead in `cycles` (P: getPowerForDash)."""
     wanted = min(along / rolling(c.player_decay, cycles), c.player_speed_max)
     return clip((wanted - speed_along) / c.dash_power_rate, -100.0, 100.0)
 
 
-@njit(cache=True, inline="always")
+@compiled
 def turn_moment(c, angle, speed):
     """Moment to send so that a player at `speed` turns by `angle` (P: getAngleForTurn)."""
     return clip(angle * (1.0 + c.inertia_moment * speed), -math.pi, math.pi)
 
 
-@njit(cache=True)
+@compiled
 def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
     """Moment of the turn needed before running to a point; 0.0 if none is.
 
@@ -43,15 +44,15 @@ def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
     """
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
     rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
-    away = math.hypot(to_x - x, to_y - y)
+    away = length(to_x - x, to_y - y)
     ratio = 3.0 if away > 20.0 else (2.0 if away > 10.0 else 0.9)
     allowed = ratio * c.kickable_distance
-    rest = math.hypot(rel_x, rel_y)
+    rest = length(rel_x, rel_y)
     cosine, sine = math.cos(yaw), math.sin(yaw)
     if not _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
         return 0.0
     angle = wrap(math.atan2(rel_y, rel_x) - yaw)
-    speed = math.hypot(vx, vy)
+    speed = length(vx, vy)
     moment = turn_moment(c, angle, speed)
     if cycles < 4 and rest < back_distance:
         reached = yaw + moment / (1.0 + c.inertia_moment * speed)
@@ -65,14 +66,14 @@ def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
     return moment
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
     across = abs(cosine * rel_y - sine * rel_x)
     behind = cosine * rel_x + sine * rel_y < 0.0
     return across > allowed or (behind and rest > back_distance)
 
 
-@njit(cache=True)
+@compiled
 def reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
     """Distance to a point that is left after `cycles` of going there (P: intercept loop)."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
@@ -81,11 +82,9 @@ def reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
         left = cycles - k
         power = 0.0
         if turning:
-            moment = turn_to_go(
-                c, x, y, vx, vy, yaw, to_x, to_y, left, c.back_dash_distance
-            )
+            moment = turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, left, c.back_dash_distance)
             if moment != 0.0:
-                yaw += moment / (1.0 + c.inertia_moment * math.hypot(vx, vy))
+                yaw += moment / (1.0 + c.inertia_moment * length(vx, vy))
                 cosine, sine = math.cos(yaw), math.sin(yaw)
             else:
                 turning = False
@@ -94,16 +93,16 @@ def reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
             power = dash_power(c, along, cosine * vx + sine * vy, left)
             vx += c.dash_power_rate * power * cosine
             vy += c.dash_power_rate * power * sine
-            speed = math.hypot(vx, vy)
+            speed = length(vx, vy)
             if speed > c.player_speed_max:
                 vx *= c.player_speed_max / speed
                 vy *= c.player_speed_max / speed
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
-    return math.hypot(to_x - x, to_y - y)
+    return length(to_x - x, to_y - y)
 
 
-@njit(cache=True)
+@compiled
 def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
     """Cycles until a player can meet the ball, and where.
 
@@ -116,22 +115,26 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
     """
     first, first_x, first_y = NEVER, 0.0, 0.0
     kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
-    bx, by = ball[0], ball[1]
-    wx, wy = ball_v[0], ball_v[1]
-    for i in range(c.intercept_horizon + 1):
-        off = math.hypot(bx - old_x, by - old_y) if has_old else math.inf
-        moving = math.hypot(wx, wy) > MOVING_BALL
+    speed = length(ball_v[0], ball_v[1])
+    i = 0
+    while i <= c.intercept_horizon:
+        roll = rolling(c.ball_decay, i)
+        bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
+        off = length(bx - old_x, by - old_y) if has_old else math.inf
+        moving = speed * c.ball_decay**i > MOVING_BALL
         candidate = moving and off < kept_off
+        skip = 1
         if first == NEVER or candidate:
             left = _left_after(c, x, y, vx, vy, yaw, bx, by, i)
             if first == NEVER and left < c.kickable_distance:
                 first, first_x, first_y = i, bx, by
             if candidate and left < SAFE_SHARE * c.kickable_distance:
                 kept, kept_x, kept_y, kept_off = i, bx, by, off
+            if first == NEVER and not has_old:
+                skip = max(int((left - c.kickable_distance) / (1.0 + speed)), 1)
         if first != NEVER and (not has_old or not moving or i >= first + KEEP_HORIZON):
             break
-        bx, by = bx + wx, by + wy
-        wx, wy = c.ball_decay * wx, c.ball_decay * wy
+        i += skip
     if kept != NEVER:
         return kept, kept_x, kept_y
     if first != NEVER:
@@ -140,61 +143,71 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
     return BEYOND, ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
 
 
-@njit(cache=True)
+@compiled
 def _left_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
-    """`reach_after`, not simulated where the point is out of question."""
+    """`reach_after`, but only a lower bound where the point is out of question."""
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
-    rest = math.hypot(to_x - x - roll * vx, to_y - y - roll * vy)
+    rest = length(to_x - x - roll * vx, to_y - y - roll * vy)
     if rest / c.player_speed_max > cycles + c.kickable_distance:
-        return math.inf
+        return rest - cycles * c.player_speed_max
     return reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles)
 
 
-@njit(cache=True)
+@compiled
 def run_cycles(c, distance, speed):
-    """Full dashes needed to cover `distance` metres from `speed` m/cycle straight ahead."""
-    cycles = 0
-    while distance > c.kickable_distance and cycles < 60:
-        speed = min(speed + 100.0 * c.dash_power_rate, c.player_speed_max)
-        distance -= speed
-        speed *= c.player_decay
+    """Full dashes needed to come within kicking distance of a point straight ahead.
+
+    Speeds before decay approach `top` geometrically, so after k dashes the way made is
+    top * k + (first - top) * (1 - decay**k) / (1 - decay).
+
+    Args:
+        distance: to the point [m].
+        speed: the player's own toward it [m/cycle].
+    """
+    needed = distance - c.kickable_distance
+    if needed <= 0.0:
+        return 0
+    top = min(100.0 * c.dash_power_rate / (1.0 - c.player_decay), c.player_speed_max)
+    lag = (speed + 100.0 * c.dash_power_rate - top) / (1.0 - c.player_decay)
+    cycles = max(int((needed - max(lag, 0.0)) / top), 1)
+    while top * cycles + lag * (1.0 - c.player_decay**cycles) < needed:
         cycles += 1
     return cycles
 
 
-@njit(cache=True)
+@compiled
 def cycles_to_point(c, x, y, vx, vy, yaw, to_x, to_y):
     """Cycles a player needs to bring a point within kicking distance (turns included)."""
     cycles = 0
     for _ in range(5):
-        if math.hypot(to_x - x, to_y - y) < c.kickable_distance:
+        if length(to_x - x, to_y - y) < c.kickable_distance:
             return cycles
         moment = turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, 1, c.back_dash_distance)
         if moment == 0.0:
             break
-        yaw += moment / (1.0 + c.inertia_moment * math.hypot(vx, vy))
+        yaw += moment / (1.0 + c.inertia_moment * length(vx, vy))
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
         cycles += 1
     speed = math.cos(yaw) * vx + math.sin(yaw) * vy
-    return cycles + run_cycles(c, math.hypot(to_x - x, to_y - y), speed)
+    return cycles + run_cycles(c, length(to_x - x, to_y - y), speed)
 
 
-@njit(cache=True)
+@compiled
 def cycles_to_ball(c, x, y, vx, vy, yaw, ball, ball_v):
     """Cycles a player needs to reach the moving ball; NEVER beyond the horizon.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
-    (P: getFastestInSetTo).
+    (P: getFastestInSetTo). Cycles are skipped in which it cannot be: the gap between cycles
+    needed and cycles passed closes by no more than one plus the ball's speed a cycle.
     """
-    bx, by = ball[0], ball[1]
-    wx, wy = ball_v[0], ball_v[1]
-    still = math.hypot(wx, wy) < 0.01
-    for i in range(2 * c.intercept_horizon):
-        if math.hypot(bx - x, by - y) / c.player_speed_max < i + 1:
-            needed = cycles_to_point(c, x, y, vx, vy, yaw, bx, by)
-            if needed <= i or still:
-                return needed
-        bx, by = bx + wx, by + wy
-        wx, wy = c.ball_decay * wx, c.ball_decay * wy
+    speed = length(ball_v[0], ball_v[1])
+    i = max(int(length(ball[0] - x, ball[1] - y) / (c.player_speed_max + speed)) - 1, 0)
+    while i < 2 * c.intercept_horizon:
+        roll = rolling(c.ball_decay, i)
+        bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
+        needed = cycles_to_point(c, x, y, vx, vy, yaw, bx, by)
+        if needed <= i or speed < STILL:
+            return needed
+        i += max(int((needed - i) / (1.0 + speed)), 1)
     return NEVER

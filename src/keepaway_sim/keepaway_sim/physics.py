@@ -17,9 +17,9 @@ import math
 import numpy as np
 import pymunk
 import pymunk.batch
-from numba import njit
 
-from keepaway_sim.geometry import TWO_PI, clip, wrap
+from keepaway_sim.compiled import compiled
+from keepaway_sim.geometry import TWO_PI, clip, length, wrap
 from keepaway_sim.streams import draw
 
 GRID = 2.0**30  # [1/m] positions and velocities are whole multiples of 1/GRID
@@ -29,20 +29,20 @@ SWEEPS = 10  # S: stadium.cpp, how often overlapping discs are pushed apart a cy
 BOUNCE = -0.1  # S: stadium.cpp, velocity factor of what collided
 
 
-@njit(cache=True, inline="always")
+@compiled
 def on_grid(value):
     """The nearest multiple of 2**-30 m."""
     return round(value * GRID) / GRID
 
 
-@njit(cache=True)
+@compiled
 def dash_acceleration(c, power, yaw):
     """Acceleration (x, y) [m/cycle^2] of a dash with `power` along the body (S: leg.cpp)."""
     effective = clip(power, c.min_dash_power, 100.0) * c.dash_power_rate
     return effective * math.cos(yaw), effective * math.sin(yaw)
 
 
-@njit(cache=True)
+@compiled
 def turned_yaw(c, yaw, moment, speed, noise):
     """Body direction after a turn command (S: player.cpp `turn`).
 
@@ -52,12 +52,10 @@ def turned_yaw(c, yaw, moment, speed, noise):
         noise: uniform in [-1, 1).
     """
     moment = clip(moment, -math.pi, math.pi)
-    return wrap(
-        yaw + (1.0 + c.player_rand * noise) * moment / (1.0 + c.inertia_moment * speed)
-    )
+    return wrap(yaw + (1.0 + c.player_rand * noise) * moment / (1.0 + c.inertia_moment * speed))
 
 
-@njit(cache=True)
+@compiled
 def kick_rate(c, rel_x, rel_y, yaw):
     """Acceleration of the ball per unit of kick power (S: player.cpp `kick`).
 
@@ -66,37 +64,37 @@ def kick_rate(c, rel_x, rel_y, yaw):
         yaw: the player's body direction [rad].
     """
     direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
-    distance_share = (math.hypot(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
+    distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
     return c.kick_power_rate * (1.0 - 0.25 * direction_share - 0.25 * distance_share)
 
 
-@njit(cache=True)
+@compiled
 def kick_acceleration(c, power, direction, rel_x, rel_y, yaw):
     """Acceleration (x, y) of the ball by a kick without noise; `direction` relative to yaw."""
     size = clip(power, 0.0, 100.0) * kick_rate(c, rel_x, rel_y, yaw)
     return size * math.cos(yaw + direction), size * math.sin(yaw + direction)
 
 
-@njit(cache=True)
+@compiled
 def kick_noise_radius(c, power, rel_x, rel_y, yaw, ball_speed):
     """Largest kick noise [m/cycle^2]: grows with power, bad placement and ball speed (S 12.0)."""
     direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
-    distance_share = (math.hypot(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
+    distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
     position_rate = 0.5 + 0.25 * (direction_share + distance_share)
     speed_rate = 0.5 + 0.5 * ball_speed / (c.ball_speed_max * c.ball_decay)
     return c.kick_rand * clip(power, 0.0, 100.0) / 100.0 * (position_rate + speed_rate)
 
 
-@njit(cache=True)
+@compiled
 def limited(x, y, largest):
     """The vector, no longer than `largest`."""
-    size = math.hypot(x, y)
+    size = length(x, y)
     if size > largest:
         return x * largest / size, y * largest / size
     return x, y
 
 
-@njit(cache=True)
+@compiled
 def moved_velocity(vx, vy, ax, ay, accel_max, speed_max, rand, uniforms, cursor, stream):
     """Velocity with which an object moves this cycle (S: object.cpp `_inc`).
 
@@ -106,15 +104,15 @@ def moved_velocity(vx, vy, ax, ay, accel_max, speed_max, rand, uniforms, cursor,
     ax, ay = limited(ax, ay, accel_max)
     vx, vy = limited(vx + ax, vy + ay, speed_max)
     if rand > 0.0 and (vx != 0.0 or vy != 0.0):
-        radius = rand * math.hypot(vx, vy) * draw(uniforms, cursor, stream)
+        radius = rand * length(vx, vy) * draw(uniforms, cursor, stream)
         angle = TWO_PI * draw(uniforms, cursor, stream)
         vx += radius * math.cos(angle)
         vy += radius * math.sin(angle)
     return on_grid(vx), on_grid(vy)
 
 
-@njit(cache=True)
-def separate(position, velocity, radius):
+@compiled
+def separate(position, velocity, radius, target, count, collided):
     """Push overlapping discs of one field apart and reverse them, in place (S: stadium.cpp).
 
     Each overlapping pair is moved symmetrically about its midpoint to touching; a disc in
@@ -124,18 +122,19 @@ def separate(position, velocity, radius):
     Args:
         position, velocity: (num_objects, 2) of one field.
         radius: (num_objects,) [m].
+        target, count, collided: (num_objects, 2), (num_objects,), (num_objects,), scratch.
     """
     num = len(radius)
-    collided = np.zeros(num, dtype=np.bool_)
+    collided[:] = False
     for _ in range(SWEEPS):
-        target = np.zeros((num, 2))
-        count = np.zeros(num)
+        target[:] = 0.0
+        count[:] = 0.0
         for i in range(num):
             for j in range(i + 1, num):
                 dx = position[j, 0] - position[i, 0]
                 dy = position[j, 1] - position[i, 1]
                 touching = radius[i] + radius[j]
-                distance = math.hypot(dx, dy)
+                distance = length(dx, dy)
                 if distance >= touching - OVERLAP:
                     continue
                 if distance > 0.0:

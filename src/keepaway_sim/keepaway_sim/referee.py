@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 
+from keepaway_sim.compiled import compiled
+from keepaway_sim.geometry import length
 from keepaway_sim.physics import on_grid
 from keepaway_sim.streams import draw
 from keepaway_sim.task import Outcome
@@ -19,7 +20,7 @@ _TAKEN_AWAY = int(Outcome.TAKEN_AWAY)
 _OUT_OF_BOUNDS = int(Outcome.OUT_OF_BOUNDS)
 
 
-@njit(cache=True)
+@compiled
 def kick_off(c, position, velocity, uniforms, cursor, stream):
     """Put players and ball of one field on their starting places, in place.
 
@@ -52,21 +53,19 @@ def kick_off(c, position, velocity, uniforms, cursor, stream):
     velocity[:] = 0.0
 
 
-@njit(cache=True)
+@compiled
 def near_ball(c, position, first, last):
     """The player of first..last-1 nearest to the ball among those within kicking distance, or -1."""
     ball = len(position) - 1
     nearest, best = -1, c.kickable_distance
     for p in range(first, last):
-        distance = math.hypot(
-            position[p, 0] - position[ball, 0], position[p, 1] - position[ball, 1]
-        )
+        distance = length(position[p, 0] - position[ball, 0], position[p, 1] - position[ball, 1])
         if distance < best:
             nearest, best = p, distance
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def next_take_count(count, keeper_near, taker_near):
     """The take counter after one cycle.
 
@@ -78,7 +77,7 @@ def next_take_count(count, keeper_near, taker_near):
     return 0 if keeper_near else count
 
 
-@njit(cache=True)
+@compiled
 def outcome(c, position, take_count):
     """Outcome of the cycle just played: out of bounds comes first, as in the server."""
     ball = len(position) - 1

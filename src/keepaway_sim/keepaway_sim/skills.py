@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 
+from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import TWO_PI, clip, cone_contains, rolling, wrap
+from keepaway_sim.geometry import TWO_PI, clip, cone_contains, length, rolling, wrap
 from keepaway_sim.intercept import (
     LOOK_AHEAD,
     dash_power,
@@ -45,10 +45,9 @@ FACING = math.radians(25.0)  # [rad] faces its direction of play well enough
 MARK_NEAR = 2.0  # [m] at the marking place: stand sideways
 MARK_SIDEWAYS = math.radians(80.0)
 MARK_LEAD = 1.0  # [m] P: a marked player is expected so far toward the marker's goal
-GRID_POINTS = 5  # open points a side
 
 
-@njit(cache=True)
+@compiled
 def command(c, s, m, f, p, action, target):
     """This cycle's command of player p for a requested action.
 
@@ -68,7 +67,7 @@ def command(c, s, m, f, p, action, target):
         x, y = s.position[f, p, target]
         return _whole(c, kick_to(c, s, f, p, x, y, c.pass_end_speed))
     if action == _OPEN:
-        chosen = get_open(c, s, f, p)
+        chosen = get_open(c, s, m, f, p)
         _look_at(c, s, f, p, 0.0, 0.0, chosen)
     elif action == _MARK:
         chosen = mark_keeper(c, s, f, p, target)
@@ -79,7 +78,7 @@ def command(c, s, m, f, p, action, target):
     return _whole(c, chosen)
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _whole(c, chosen):
     """Commands are sent as whole numbers (degrees), cut toward zero (P: SoccerTypes.cc)."""
     kind, power, angle = chosen
@@ -89,32 +88,32 @@ def _whole(c, chosen):
     return kind, power, angle
 
 
-@njit(cache=True)
+@compiled
 def _look_at(c, s, f, p, x, y, chosen):
     if c.visible_angle < TWO_PI - 1e-9:
         turn_neck(c, s, f, p, x, y, expected_turn(c, s, f, p, chosen[0], chosen[2]))
 
 
-@njit(cache=True)
+@compiled
 def expected_turn(c, s, f, p, kind, angle):
     """By how much player p expects its body to turn with a command."""
     if kind != TURN:
         return 0.0
-    speed = math.hypot(s.velocity[f, p, p, 0], s.velocity[f, p, p, 1])
+    speed = length(s.velocity[f, p, p, 0], s.velocity[f, p, p, 1])
     return angle / (1.0 + c.inertia_moment * speed)
 
 
-@njit(cache=True)
+@compiled
 def turn_body_to(c, s, f, p, x, y, cycles):
     """Turn toward a point as seen from where the player will have rolled after `cycles`."""
     px, py = s.position[f, p, p]
     vx, vy = s.velocity[f, p, p]
     roll = rolling(c.player_decay, cycles)
     angle = wrap(math.atan2(y - py - roll * vy, x - px - roll * vx) - s.body[f, p, p])
-    return TURN, 0.0, turn_moment(c, angle, math.hypot(vx, vy))
+    return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
 
 
-@njit(cache=True)
+@compiled
 def turn_body_along(c, s, f, p, direction):
     """Turn toward a global direction."""
     x, y = s.position[f, p, p]
@@ -124,7 +123,7 @@ def turn_body_along(c, s, f, p, direction):
     )
 
 
-@njit(cache=True)
+@compiled
 def dash_to(c, s, f, p, x, y, cycles):
     """Dash so as to come nearest to a point in `cycles`."""
     px, py = s.position[f, p, p]
@@ -134,20 +133,18 @@ def dash_to(c, s, f, p, x, y, cycles):
     return DASH, dash_power(c, along, cosine * vx + sine * vy, cycles), 0.0
 
 
-@njit(cache=True)
+@compiled
 def move_to(c, s, f, p, x, y, when_to_turn, back_distance):
     """Run to a point: dash if it lies ahead (or near behind), else turn (P: moveToPos)."""
     px, py = s.position[f, p, p]
     vx, vy = s.velocity[f, p, p]
     roll = 1.0 / (1.0 - c.player_decay)
-    angle = wrap(
-        math.atan2(y - py - roll * vy, x - px - roll * vx) - s.body[f, p, p]
-    )
+    angle = wrap(math.atan2(y - py - roll * vy, x - px - roll * vx) - s.body[f, p, p])
     back = wrap(angle + math.pi)
-    away = math.hypot(x - px, y - py)
+    away = length(x - px, y - py)
     if abs(angle) < when_to_turn or (abs(back) < when_to_turn and away < back_distance):
         return dash_to(c, s, f, p, x, y, 1)
-    speed = math.hypot(vx, vy)
+    speed = length(vx, vy)
     turns, left = 0, angle
     while abs(left) > when_to_turn and turns < 3:
         left -= turn_moment(c, left, speed) / (1.0 + c.inertia_moment * speed)
@@ -158,7 +155,7 @@ def move_to(c, s, f, p, x, y, when_to_turn, back_distance):
     return dash_to(c, s, f, p, px, py, 1)  # too fast to turn: stop first
 
 
-@njit(cache=True)
+@compiled
 def search(c, s, m, f, p):
     """Turn on and on in steps, first toward where the ball was believed (P: searchBall)."""
     now = s.cycle[f]
@@ -170,31 +167,29 @@ def search(c, s, m, f, p):
         m.search_sign[f, p] = 1.0 if left else -1.0
     m.search_cycle[f, p] = now
     s.neck[f, p] = 0.0
-    return turn_body_along(
-        c, s, f, p, s.body[f, p, p] + m.search_sign[f, p] * c.search_turn
-    )
+    return turn_body_along(c, s, f, p, s.body[f, p, p] + m.search_sign[f, p] * c.search_turn)
 
 
-@njit(cache=True)
+@compiled
 def closest_opponent_to(c, s, f, p, x, y):
     """(player, distance) of the known opponent nearest to a point; (-1, inf) without one."""
     nearest, best = -1, math.inf
     for j in range(c.num_keepers + c.num_takers):
         if same_team(c, p, j) or s.age[f, p, j] > c.player_lost_age:
             continue
-        away = math.hypot(s.position[f, p, j, 0] - x, s.position[f, p, j, 1] - y)
+        away = length(s.position[f, p, j, 0] - x, s.position[f, p, j, 1] - y)
         if away < best:
             nearest, best = j, away
     return nearest, best
 
 
-@njit(cache=True)
+@compiled
 def direction_of_play(c, p):
     """Keepers play toward +x, takers toward -x (the server's left and right team)."""
     return 0.0 if p < c.num_keepers else math.pi
 
 
-@njit(cache=True)
+@compiled
 def ball_after(c, s, f, p, kind, power, angle):
     """Believed place of the ball after this cycle's own command."""
     ball = c.num_keepers + c.num_takers
@@ -207,7 +202,7 @@ def ball_after(c, s, f, p, kind, power, angle):
     return x + vx, y + vy
 
 
-@njit(cache=True)
+@compiled
 def hold_ball(c, s, f, p, distance):
     """Keep the ball on the side away from the nearest opponent (P: holdBall).
 
@@ -226,18 +221,18 @@ def hold_ball(c, s, f, p, distance):
         heads_left = wrap(s.body[f, p, opponent] - from_opponent) > 0.0
         angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - yaw)
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
-    spot = math.hypot(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))
+    spot = length(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))
     if spot < AT_SPOT:
         chosen = turn_body_along(c, s, f, p, direction_of_play(c, p))
         next_x, next_y = ball_after(c, s, f, p, NONE, 0.0, 0.0)
         vx, vy = s.velocity[f, p, p]
-        stays = math.hypot(next_x - px - vx, next_y - py - vy)
+        stays = length(next_x - px - vx, next_y - py - vy)
         if stays < STAYS_SHARE * c.kickable_distance:
             return chosen
     return kick_close(c, s, f, p, angle, distance)
 
 
-@njit(cache=True)
+@compiled
 def _rate(c, s, f, p):
     ball = c.num_keepers + c.num_takers
     px, py = s.position[f, p, p]
@@ -245,7 +240,7 @@ def _rate(c, s, f, p):
     return kick_rate(c, bx - px, by - py, s.body[f, p, p])
 
 
-@njit(cache=True)
+@compiled
 def kick_close(c, s, f, p, angle, distance):
     """Kick the ball to a spot beside the body (P: kickBallCloseToBody).
 
@@ -262,13 +257,13 @@ def kick_close(c, s, f, p, angle, distance):
     reach = c.touch_distance + c.kickable_margin * distance
     want_x = px + ux + reach * math.cos(yaw + angle) - bx - vx
     want_y = py + uy + reach * math.sin(yaw + angle) - by - vy
-    power = math.hypot(want_x, want_y) / _rate(c, s, f, p)
-    if power > 100.0 and math.hypot(vx, vy) > 0.1:
+    power = length(want_x, want_y) / _rate(c, s, f, p)
+    if power > 100.0 and length(vx, vy) > 0.1:
         return freeze_ball(c, s, f, p)
     return KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - yaw)
 
 
-@njit(cache=True)
+@compiled
 def freeze_ball(c, s, f, p):
     """Stop the ball where it is, or bring it back within reach (P: freezeBall)."""
     ball = c.num_keepers + c.num_takers
@@ -276,13 +271,13 @@ def freeze_ball(c, s, f, p):
     ux, uy = s.velocity[f, p, p]
     bx, by = s.position[f, p, ball]
     vx, vy = s.velocity[f, p, ball]
-    power = min(math.hypot(vx, vy) / _rate(c, s, f, p), 100.0)
+    power = min(length(vx, vy) / _rate(c, s, f, p), 100.0)
     angle = wrap(math.atan2(vy, vx) + math.pi - s.body[f, p, p])
     next_x, next_y = ball_after(c, s, f, p, KICK, power, angle)
-    if math.hypot(next_x - px - ux, next_y - py - uy) < FREEZE_SHARE * c.kickable_distance:
+    if length(next_x - px - ux, next_y - py - uy) < FREEZE_SHARE * c.kickable_distance:
         return KICK, power, angle
     rel_x, rel_y = bx - px - ux, by - py - uy
-    rest = math.hypot(rel_x, rel_y)
+    rest = length(rel_x, rel_y)
     reach = min(SAFE_REACH * c.kickable_distance, rest - 0.1)
     direction = math.atan2(rel_y, rel_x)
     to_x = px + ux + reach * math.cos(direction)
@@ -293,7 +288,7 @@ def freeze_ball(c, s, f, p):
 SAFE_REACH = 0.7  # [1] of the kickable distance, where a frozen ball is brought back to
 
 
-@njit(cache=True)
+@compiled
 def accelerate_ball(c, s, f, p, want_x, want_y):
     """Give the ball a velocity, or at least its direction (P: accelerateBallToVelocity)."""
     ball = c.num_keepers + c.num_takers
@@ -301,7 +296,7 @@ def accelerate_ball(c, s, f, p, want_x, want_y):
     yaw = s.body[f, p, p]
     rate = _rate(c, s, f, p)
     ax, ay = want_x - vx, want_y - vy
-    size = math.hypot(ax, ay)
+    size = length(ax, ay)
     if size < c.ball_accel_max and size / rate <= 100.0:
         return KICK, size / rate, wrap(math.atan2(ay, ax) - yaw)
     direction = math.atan2(want_y, want_x)
@@ -310,23 +305,23 @@ def accelerate_ball(c, s, f, p, want_x, want_y):
     return KICK, 100.0, wrap(angle - yaw)
 
 
-@njit(cache=True)
+@compiled
 def rank_of(c, s, f, p, keeper):
     """How many other keepers player p believes closer to itself than `keeper`."""
     own = s.position[f, p, p]
     x, y = s.position[f, p, keeper]
-    away = math.hypot(x - own[0], y - own[1])
+    away = length(x - own[0], y - own[1])
     rank = 0
     for j in range(c.num_keepers):
         if j == p or j == keeper:
             continue
-        other = math.hypot(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        other = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
         if other < away or (other == away and j < keeper):
             rank += 1
     return rank
 
 
-@njit(cache=True)
+@compiled
 def keeper_of_rank(c, s, f, p, rank):
     """The keeper that player p believes to be of this rank by distance, 0 the closest."""
     for j in range(c.num_keepers):
@@ -335,7 +330,7 @@ def keeper_of_rank(c, s, f, p, rank):
     return p
 
 
-@njit(cache=True)
+@compiled
 def pass_speed(c, distance, end_speed):
     """First speed of a ball that covers `distance` and then has `end_speed` (whole cycles)."""
     growth = 1.0 / c.ball_decay
@@ -343,7 +338,7 @@ def pass_speed(c, distance, end_speed):
     return end_speed * growth ** round(steps)
 
 
-@njit(cache=True)
+@compiled
 def kick_to(c, s, f, p, x, y, end_speed):
     """Kick the ball so that it passes a point with `end_speed`, set it up first if it must be.
 
@@ -355,53 +350,49 @@ def kick_to(c, s, f, p, x, y, end_speed):
     bx, by = s.position[f, p, ball]
     vx, vy = s.velocity[f, p, ball]
     direction = math.atan2(y - by, x - bx)
-    speed = pass_speed(c, math.hypot(x - bx, y - by), end_speed)
+    speed = pass_speed(c, length(x - bx, y - by), end_speed)
     cosine, sine = math.cos(direction), math.sin(direction)
-    if math.hypot(px + ux - bx - speed * cosine, py + uy - by - speed * sine) < c.touch_distance:
+    if length(px + ux - bx - speed * cosine, py + uy - by - speed * sine) < c.touch_distance:
         along = abs(cosine * (px - bx) + sine * (py - by))  # the kick would hit the own body
         speed = along - c.touch_distance if speed < along else along + c.touch_distance
     rate = _rate(c, s, f, p)
     if speed > c.ball_speed_max:
         return _kick_unreachable(c, s, f, p, direction, speed, rate)
-    power = math.hypot(speed * cosine - vx, speed * sine - vy) / rate
+    power = length(speed * cosine - vx, speed * sine - vy) / rate
     pressed = closest_opponent_to(c, s, f, p, bx, by)[1] < PRESSED_RANGE
     if power <= 100.0 * (OVER_POWER_PRESSED if pressed else OVER_POWER):
         return accelerate_ball(c, s, f, p, speed * cosine, speed * sine)
     return kick_close(c, s, f, p, 0.0, c.setup_distance)
 
 
-@njit(cache=True)
+@compiled
 def _kick_unreachable(c, s, f, p, direction, speed, rate):
     """A kick harder than the ball can fly: kick if nearly full speed, else set it up."""
     ball = c.num_keepers + c.num_takers
     vx, vy = s.velocity[f, p, ball]
     across = -math.sin(direction) * vx + math.cos(direction) * vy
     angle = direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
-    reached = math.hypot(
-        vx + 100.0 * rate * math.cos(angle), vy + 100.0 * rate * math.sin(angle)
-    )
+    reached = length(vx + 100.0 * rate * math.cos(angle), vy + 100.0 * rate * math.sin(angle))
     if reached > c.when_to_kick * c.ball_accel_max:
-        return accelerate_ball(
-            c, s, f, p, speed * math.cos(direction), speed * math.sin(direction)
-        )
+        return accelerate_ball(c, s, f, p, speed * math.cos(direction), speed * math.sin(direction))
     if rate > c.when_to_kick * c.kick_power_rate:
         return freeze_ball(c, s, f, p)
     return kick_close(c, s, f, p, 0.0, c.setup_distance)
 
 
-@njit(cache=True)
-def get_open(c, s, f, p):
+@compiled
+def get_open(c, s, m, f, p):
     """Move to the least crowded point a pass can reach (P: getOpenForPassFromInRectangle)."""
     from_x, from_y = pass_origin(c, s, f, p)
-    x, y = open_point(c, s, f, p, from_x, from_y)
+    x, y = open_point(c, s, m, f, p, from_x, from_y)
     own = s.position[f, p, p]
-    if math.hypot(x - own[0], y - own[1]) < c.open_buffer:
+    if length(x - own[0], y - own[1]) < c.open_buffer:
         ball = c.num_keepers + c.num_takers
         return turn_body_to(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], 1)
     return move_to(c, s, f, p, x, y, c.when_to_turn, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def pass_origin(c, s, f, p):
     """Where the ball is believed to be when the fastest team-mate has it."""
     ball = c.num_keepers + c.num_takers
@@ -414,34 +405,36 @@ def pass_origin(c, s, f, p):
     return x + roll * vx, y + roll * vy
 
 
-@njit(cache=True)
-def open_point(c, s, f, p, from_x, from_y):
+@compiled
+def open_point(c, s, m, f, p, from_x, from_y):
     """The point of a 5 x 5 grid with least congestion and no taker in the lane to it.
 
     Congestion is the sum over all other players of 1 / distance. The centre if every lane is
     blocked.
     """
-    best, best_x, best_y = math.inf, 0.0, 0.0
-    num = c.num_keepers + c.num_takers
-    share = 1.0 - 2.0 * c.open_border
-    for i in range(GRID_POINTS):
-        x = share * c.field_length * (i / (GRID_POINTS - 1) - 0.5)
-        for k in range(GRID_POINTS):
-            y = share * c.field_width * (0.5 - k / (GRID_POINTS - 1))
-            congestion = 0.0
-            for j in range(num):
-                if j == p or s.age[f, p, j] > c.player_lost_age:
-                    continue
-                dx, dy = s.position[f, p, j, 0] - x, s.position[f, p, j, 1] - y
-                congestion += 1.0 / max(math.sqrt(dx * dx + dy * dy), 1e-9)
-                if congestion >= best:
-                    break
-            if congestion < best and not _lane_blocked(c, s, f, p, from_x, from_y, x, y):
-                best, best_x, best_y = congestion, x, y
-    return best_x, best_y
+    congestion, x, y = m.congestion, m.open_x, m.open_y
+    congestion[:] = 0.0
+    for j in range(c.num_keepers + c.num_takers):
+        if j == p or s.age[f, p, j] > c.player_lost_age:
+            continue
+        px, py = s.position[f, p, j]
+        for k in range(len(congestion)):
+            dx, dy = px - x[k], py - y[k]
+            congestion[k] += 1.0 / math.sqrt(dx * dx + dy * dy + 1e-18)
+    for _ in range(len(congestion)):
+        best = 0
+        for k in range(1, len(congestion)):
+            if congestion[k] < congestion[best]:
+                best = k
+        if congestion[best] == math.inf:
+            break
+        if not _lane_blocked(c, s, f, p, from_x, from_y, x[best], y[best]):
+            return x[best], y[best]
+        congestion[best] = math.inf
+    return 0.0, 0.0
 
 
-@njit(cache=True)
+@compiled
 def _lane_blocked(c, s, f, p, from_x, from_y, x, y):
     for j in range(c.num_keepers + c.num_takers):
         if same_team(c, p, j) or s.age[f, p, j] > c.player_lost_age:
@@ -452,7 +445,7 @@ def _lane_blocked(c, s, f, p, from_x, from_y, x, y):
     return False
 
 
-@njit(cache=True)
+@compiled
 def go_to_ball(c, s, m, f, p):
     """Intercept the ball; a taker that has it holds it, and leaves it to a team-mate that has."""
     ball = c.num_keepers + c.num_takers
@@ -463,13 +456,13 @@ def go_to_ball(c, s, m, f, p):
         nearest = _nearest_to_ball(c, s, f, p, 0)
         if nearest != p and nearest >= c.num_keepers:
             ox, oy = s.position[f, p, nearest]
-            if math.hypot(ox - bx, oy - by) < c.kickable_distance:
+            if length(ox - bx, oy - by) < c.kickable_distance:
                 vx, vy = s.velocity[f, p, ball]
                 return turn_body_to(c, s, f, p, bx + vx, by + vy, 1)
     return intercept(c, s, m, f, p)
 
 
-@njit(cache=True)
+@compiled
 def _nearest_to_ball(c, s, f, p, first):
     """The known player of first.. believed nearest to the ball; p itself counts always."""
     ball = c.num_keepers + c.num_takers
@@ -485,7 +478,7 @@ def _nearest_to_ball(c, s, f, p, first):
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def intercept(c, s, m, f, p):
     """Go where the ball can be met first (P: intercept, predictCommandToInterceptBall)."""
     ball = c.num_keepers + c.num_takers
@@ -513,17 +506,15 @@ def intercept(c, s, m, f, p):
         if close[0] != NONE:
             return close
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
-    if math.hypot(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
+    if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
         return turn_body_along(c, s, f, p, direction_of_play(c, p))
-    moment = turn_to_go(
-        c, x, y, vx, vy, s.body[f, p, p], to_x, to_y, cycles, c.back_dash_distance
-    )
+    moment = turn_to_go(c, x, y, vx, vy, s.body[f, p, p], to_x, to_y, cycles, c.back_dash_distance)
     if moment != 0.0:
         return TURN, 0.0, moment
     return dash_to(c, s, f, p, to_x, to_y, max(cycles, 1))
 
 
-@njit(cache=True)
+@compiled
 def meet_closely(c, s, f, p):
     """Command for a ball that can be met within two cycles; NONE if nothing helps.
 
@@ -544,15 +535,13 @@ def meet_closely(c, s, f, p):
     within = FREEZE_SHARE * c.kickable_distance
     turn_helps = False
     reached = yaw
-    speed = math.hypot(vx, vy)
+    speed = length(vx, vy)
     for cycles in (1, 2):
         angle = wrap(forward - reached)
         reached += turn_moment(c, angle, speed) / (1.0 + c.inertia_moment * speed)
         speed *= c.player_decay
         roll, ball_roll = rolling(c.player_decay, cycles), rolling(c.ball_decay, cycles)
-        away = math.hypot(
-            px + roll * vx - bx - ball_roll * ux, py + roll * vy - by - ball_roll * uy
-        )
+        away = length(px + roll * vx - bx - ball_roll * ux, py + roll * vy - by - ball_roll * uy)
         if away < within:
             turn_helps = True
             if abs(wrap(forward - reached)) < FACING:
@@ -562,7 +551,7 @@ def meet_closely(c, s, f, p):
         sx = px + vx + c.dash_power_rate * stop * math.cos(yaw)
         sy = py + vy + c.dash_power_rate * stop * math.sin(yaw)
         ball_roll = rolling(c.ball_decay, 2)
-        if math.hypot(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
+        if length(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
             return kind, stop, 0.0
     if turn_helps:
         return turn
@@ -571,7 +560,7 @@ def meet_closely(c, s, f, p):
     return NONE, 0.0, 0.0
 
 
-@njit(cache=True)
+@compiled
 def _one_dash(c, s, f, p):
     """(power, helps): the dash after which the ball lies in front of the body and in reach.
 
@@ -602,15 +591,15 @@ def _one_dash(c, s, f, p):
     return power, away < 0.95 * c.kickable_distance
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _dash_result(c, wanted, speed, along, across):
     """(power, distance to the ball) of a dash meant to end `wanted` beyond rolling out once."""
     power = dash_power(c, wanted + speed, speed, 1)
     gained = clip(power, c.min_dash_power, 100.0) * c.dash_power_rate
-    return power, math.hypot(along - gained, across)
+    return power, length(along - gained, across)
 
 
-@njit(cache=True)
+@compiled
 def mark_keeper(c, s, f, p, keeper):
     """Stand between a keeper and the ball, sideways when there (P: mark, MARK_BALL)."""
     ball = c.num_keepers + c.num_takers
@@ -621,11 +610,9 @@ def mark_keeper(c, s, f, p, keeper):
     direction = math.atan2(by - ky, bx - lead_x)
     x = lead_x + c.mark_distance * math.cos(direction)
     y = ky + c.mark_distance * math.sin(direction)
-    if math.hypot(x - px, y - py) >= MARK_NEAR:
+    if length(x - px, y - py) >= MARK_NEAR:
         return move_to(c, s, f, p, x, y, c.mark_turn_angle, c.mark_back_distance)
     to_keeper = math.atan2(ky - py, kx - px)
     to_ball = math.atan2(by - py, bx - px)
     left = wrap(to_ball - to_keeper) >= 0.0
-    return turn_body_along(
-        c, s, f, p, to_keeper + (MARK_SIDEWAYS if left else -MARK_SIDEWAYS)
-    )
+    return turn_body_along(c, s, f, p, to_keeper + (MARK_SIDEWAYS if left else -MARK_SIDEWAYS))

@@ -8,8 +8,8 @@ sizes do not matter, because `Generator.random(n)` is n times `Generator.random(
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from keepaway_sim.compiled import compiled
 from keepaway_sim.errors import KeepawayError
 
 
@@ -58,7 +58,7 @@ class RandomStreams:
             self.cursor[stream] = 0
 
 
-@njit(cache=True, inline="always")
+@compiled
 def draw(uniforms, cursor, stream):
     """The next uniform of a stream. Shapes: (num_streams, block), (num_streams,)."""
     value = uniforms[stream, cursor[stream]]

@@ -17,15 +17,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import TWO_PI, quantize, wrap
+from keepaway_sim.compiled import compiled
+from keepaway_sim.config import NEVER, Constants
+from keepaway_sim.geometry import TWO_PI, length, quantize, wrap
 from keepaway_sim.physics import dash_acceleration, kick_acceleration, limited
 from keepaway_sim.streams import draw
 
 NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0  # kinds of commands
 
+OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
 CHASE_SPEED = 0.3  # [m/cycle] P: an unseen opponent nearest to the ball is believed to come so fast
 BUMPED_DISTANCE = 0.2  # [m] P: where a ball is believed after a bump
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
@@ -80,6 +81,9 @@ class Memory(NamedTuple):
     intercept_point: np.ndarray  # (F, P, 2) [m] and where
     search_cycle: np.ndarray  # (F, P) int64 last cycle of a search
     search_sign: np.ndarray  # (F, P) which way round
+    open_x: np.ndarray  # (25,) [m] the points where a keeper may get open
+    open_y: np.ndarray  # (25,) [m]
+    congestion: np.ndarray  # (25,) [1/m] scratch
 
 
 def make_perceptions(num_fields: int, num_players: int) -> Perceptions:
@@ -113,8 +117,11 @@ def make_speech(num_fields: int, num_players: int) -> Speech:
     )
 
 
-def make_memory(num_fields: int, num_players: int) -> Memory:
+def make_memory(c: Constants, num_fields: int) -> Memory:
     """Memory of players before their first cycle."""
+    num_players = c.num_keepers + c.num_takers
+    share = np.linspace(-0.5, 0.5, OPEN_POINTS) * (1.0 - 2.0 * c.open_border)
+    open_x, open_y = np.meshgrid(c.field_length * share, -c.field_width * share, indexing="ij")
     shape = (num_fields, num_players)
     return Memory(
         self_error=np.zeros((*shape, 2)),
@@ -128,16 +135,19 @@ def make_memory(num_fields: int, num_players: int) -> Memory:
         intercept_point=np.zeros((*shape, 2)),
         search_cycle=np.full(shape, -10, dtype=np.int64),
         search_sign=np.ones(shape),
+        open_x=open_x.ravel(),
+        open_y=open_y.ravel(),
+        congestion=np.zeros(OPEN_POINTS**2),
     )
 
 
-@njit(cache=True, inline="always")
+@compiled
 def same_team(c, p, q):
     """Do players p and q play for the same team?"""
     return (p < c.num_keepers) == (q < c.num_keepers)
 
 
-@njit(cache=True)
+@compiled
 def forget(c, s, m, f, p, uniforms, cursor):
     """A new episode: player p has seen nothing of it yet and gets a new phase of looking."""
     num = c.num_keepers + c.num_takers
@@ -153,7 +163,7 @@ def forget(c, s, m, f, p, uniforms, cursor):
     m.look_phase[f, p] = int(draw(uniforms, cursor, f) * c.look_period)
 
 
-@njit(cache=True)
+@compiled
 def remember(c, s, m, f, p):
     """Carry player p's belief about all others one cycle on, before anything new is known."""
     num = c.num_keepers + c.num_takers
@@ -181,7 +191,7 @@ def remember(c, s, m, f, p):
         if j == chaser:
             dx = position[ball, 0] - position[j, 0]
             dy = position[ball, 1] - position[j, 1]
-            distance = math.hypot(dx, dy)
+            distance = length(dx, dy)
             if distance > 0.0:
                 position[j, 0] += CHASE_SPEED * dx / distance
                 position[j, 1] += CHASE_SPEED * dy / distance
@@ -198,7 +208,7 @@ def remember(c, s, m, f, p):
         _stop_ball_of_opponent(c, s, f, p)
 
 
-@njit(cache=True)
+@compiled
 def _stop_ball_of_opponent(c, s, f, p):
     """P: a ball within an opponent's reach is believed to lie still; nobody knows his plans."""
     ball = c.num_keepers + c.num_takers
@@ -207,12 +217,12 @@ def _stop_ball_of_opponent(c, s, f, p):
         return
     dx = s.position[f, p, ball, 0] - s.position[f, p, opponent, 0]
     dy = s.position[f, p, ball, 1] - s.position[f, p, opponent, 1]
-    if math.hypot(dx, dy) < c.kickable_distance:
+    if length(dx, dy) < c.kickable_distance:
         s.velocity[f, p, ball, 0] = 0.0
         s.velocity[f, p, ball, 1] = 0.0
 
 
-@njit(cache=True)
+@compiled
 def _nearest_opponent_to_ball(c, s, f, p):
     num = c.num_keepers + c.num_takers
     nearest, best = -1, math.inf
@@ -227,13 +237,13 @@ def _nearest_opponent_to_ball(c, s, f, p):
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def feel_self(c, s, m, position, velocity, f, p):
     """Own position and speed as the body feels them, nearly exact; a bump shows in the speed."""
     ux, uy = _expected_own_velocity(c, s, m, f, p)
     s.position[f, p, p, 0] = position[p, 0] + m.self_error[f, p, 0]
     s.position[f, p, p, 1] = position[p, 1] + m.self_error[f, p, 1]
-    speed = math.hypot(velocity[p, 0], velocity[p, 1])
+    speed = length(velocity[p, 0], velocity[p, 1])
     share = quantize(speed, c.speed_step) / speed if speed > 0.0 else 0.0
     vx, vy = share * velocity[p, 0], share * velocity[p, 1]
     s.velocity[f, p, p, 0], s.velocity[f, p, p, 1] = vx, vy
@@ -242,7 +252,7 @@ def feel_self(c, s, m, position, velocity, f, p):
         _bump_ball(c, s, f, p)
 
 
-@njit(cache=True)
+@compiled
 def _expected_own_velocity(c, s, m, f, p):
     """Velocity that player p expects of its last command, before it feels the real one."""
     vx, vy = s.velocity[f, p, p]
@@ -252,13 +262,13 @@ def _expected_own_velocity(c, s, m, f, p):
     return c.player_decay * vx, c.player_decay * vy
 
 
-@njit(cache=True)
+@compiled
 def _seems_bumped(c, s, f, p, vx, vy, ux, uy):
     """P: does felt velocity (vx, vy) against the expected (ux, uy) mean a bump into the ball?"""
     ball = c.num_keepers + c.num_takers
     own = s.position[f, p, p]
-    away = math.hypot(s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1])
-    felt, expected = math.hypot(vx, vy), math.hypot(ux, uy)
+    away = length(s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1])
+    felt, expected = length(vx, vy), length(ux, uy)
     if felt == 0.0:
         stopped = expected > 0.01 and away < 0.8
         return stopped or away < c.touch_distance
@@ -267,12 +277,12 @@ def _seems_bumped(c, s, f, p, vx, vy, ux, uy):
     return _turned_round(vx, ux) and _turned_round(vy, uy)
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _turned_round(felt, expected):
     return felt * expected < 0.0 or abs(expected) < 0.08
 
 
-@njit(cache=True)
+@compiled
 def _bump_ball(c, s, f, p):
     """P: after a bump the ball is believed just before the body, its velocity reversed.
 
@@ -281,11 +291,11 @@ def _bump_ball(c, s, f, p):
     ball = c.num_keepers + c.num_takers
     own = s.position[f, p, p]
     dx, dy = s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1]
-    distance = math.hypot(dx, dy)
+    distance = length(dx, dy)
     for j in range(ball):
         if j == p or s.age[f, p, j] > c.player_lost_age:
             continue
-        away = math.hypot(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        away = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
         if away < distance:
             return
     angle = math.atan2(dy, dx)
@@ -295,7 +305,7 @@ def _bump_ball(c, s, f, p):
     s.velocity[f, p, ball, 1] *= -0.1
 
 
-@njit(cache=True)
+@compiled
 def hear(c, s, speech, f, p, uniforms, cursor):
     """Take the one message that player p hears this cycle: a random team-mate's."""
     first = 0 if p < c.num_keepers else c.num_keepers
@@ -316,7 +326,7 @@ def hear(c, s, speech, f, p, uniforms, cursor):
         _hear_of_ball(c, s, speech, f, p, speaker)
 
 
-@njit(cache=True)
+@compiled
 def _hear_of_player(s, f, p, who, x, y):
     if s.age[f, p, who] > 1:
         s.position[f, p, who, 0], s.position[f, p, who, 1] = x, y
@@ -325,19 +335,20 @@ def _hear_of_player(s, f, p, who, x, y):
         s.age[f, p, who] = 1
 
 
-@njit(cache=True)
+@compiled
 def _hear_of_ball(c, s, speech, f, p, speaker):
     ball = c.num_keepers + c.num_takers
     x, y, vx, vy = speech.ball[f, speaker]
     own = s.position[f, p, p]
     known = s.age[f, p, ball] < NEVER
-    if known and math.hypot(
-        s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1]
-    ) < DEAF_RANGE:
+    if (
+        known
+        and length(s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1])
+        < DEAF_RANGE
+    ):
         return
     differs = (
-        math.hypot(vx - s.velocity[f, p, ball, 0], vy - s.velocity[f, p, ball, 1])
-        > CHANGED_VELOCITY
+        length(vx - s.velocity[f, p, ball, 0], vy - s.velocity[f, p, ball, 1]) > CHANGED_VELOCITY
     )
     if s.age[f, p, ball] > STALE_BALL or differs:
         s.position[f, p, ball, 0], s.position[f, p, ball, 1] = x, y
@@ -345,13 +356,13 @@ def _hear_of_ball(c, s, speech, f, p, speaker):
         s.age[f, p, ball] = speech.ball_age[f, speaker]
 
 
-@njit(cache=True)
+@compiled
 def looks_now(c, m, f, p, time):
     """Does player p see something new in this cycle of its field's life?"""
     return (time + m.look_phase[f, p]) % c.look_period != c.look_period - 1
 
 
-@njit(cache=True)
+@compiled
 def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
     """Player p sees its surroundings (truth: one field's arrays) and updates its belief."""
     num = c.num_keepers + c.num_takers
@@ -369,7 +380,7 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         if j == p:
             continue
         dx, dy = position[j, 0] - position[p, 0], position[j, 1] - position[p, 1]
-        distance = math.hypot(dx, dy)
+        distance = length(dx, dy)
         direction = wrap(math.atan2(dy, dx) - face)
         seen = abs(direction) <= 0.5 * c.visible_angle
         if not seen and distance > c.feel_distance:
@@ -381,11 +392,11 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         if seen and j < num:
             s.body[f, p, j] = wrap(yaw[j] + yaw_error)
     own, ball = s.position[f, p, p], s.position[f, p, num]
-    if math.hypot(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
+    if length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
         _stop_ball_of_opponent(c, s, f, p)
 
 
-@njit(cache=True)
+@compiled
 def _see(
     c, s, velocity, f, p, j, dx, dy, distance, direction, seen, face, yaw_error, uniforms, cursor
 ):
@@ -421,7 +432,7 @@ def _see(
     s.velocity[f, p, j, 0], s.velocity[f, p, j, 1] = vx, vy
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _reported_distance(c, distance):
     """S: the logarithm is rounded, then the distance itself, to quantize_step."""
     if c.quantize_step == 0.0:
@@ -430,7 +441,7 @@ def _reported_distance(c, distance):
     return quantize(rough, 0.1)
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _velocity_visible(c, distance, uniforms, cursor, f):
     """Near objects show how they move; farther ones with falling probability."""
     if distance <= c.certain_distance:
@@ -439,16 +450,16 @@ def _velocity_visible(c, distance, uniforms, cursor, f):
     return draw(uniforms, cursor, f) < share
 
 
-@njit(cache=True, inline="always")
+@compiled
 def _blended(c, seen_x, seen_y, expected_x, expected_y):
     """P: mean of seen and expected ball velocity, unless somebody must have touched it."""
-    near = 2.0 * c.ball_rand * math.hypot(expected_x, expected_y)
+    near = 2.0 * c.ball_rand * length(expected_x, expected_y)
     if abs(seen_x - expected_x) <= near and abs(seen_y - expected_y) <= near:
         return 0.5 * (seen_x + expected_x), 0.5 * (seen_y + expected_y)
     return seen_x, seen_y
 
 
-@njit(cache=True)
+@compiled
 def speak(c, s, speech, m, f, p, kicked):
     """Compose what player p tells its team-mates after it chose its command.
 
@@ -457,7 +468,7 @@ def speak(c, s, speech, m, f, p, kicked):
     """
     num = c.num_keepers + c.num_takers
     own, ball = s.position[f, p, p], s.position[f, p, num]
-    distance = math.hypot(ball[0] - own[0], ball[1] - own[1])
+    distance = length(ball[0] - own[0], ball[1] - own[1])
     speech.ball_age[f, p] = -1
     if s.age[f, p, num] == 0 and distance < SHARED_RANGE:
         _speak_of_ball(c, s, speech, m, f, p, distance, kicked)
@@ -465,7 +476,7 @@ def speak(c, s, speech, m, f, p, kicked):
     for j in range(num):
         if same_team(c, p, j) or s.age[f, p, j] != 0:
             continue
-        away = math.hypot(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        away = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
         if away < best:
             nearest, best = j, away
     speech.opponent[f, p] = nearest
@@ -478,7 +489,7 @@ def speak(c, s, speech, m, f, p, kicked):
     speech.own[f, p, 1] = quantize(own[1] + s.velocity[f, p, p, 1], c.hear_step_y)
 
 
-@njit(cache=True)
+@compiled
 def _speak_of_ball(c, s, speech, m, f, p, distance, kicked):
     ball = c.num_keepers + c.num_takers
     x, y = s.position[f, p, ball]
@@ -498,7 +509,7 @@ def _speak_of_ball(c, s, speech, m, f, p, distance, kicked):
             wx, wy = limited(vx + ax, vy + ay, c.ball_speed_max)
             nx = s.position[f, p, p, 0] + s.velocity[f, p, p, 0]
             ny = s.position[f, p, p, 1] + s.velocity[f, p, p, 1]
-            away = math.hypot(x + wx - nx, y + wy - ny) > c.kickable_distance + 0.2
+            away = length(x + wx - nx, y + wy - ny) > c.kickable_distance + 0.2
         if away:
             x, y = x + wx, y + wy
             vx, vy = wx * c.ball_decay, wy * c.ball_decay
@@ -511,7 +522,7 @@ def _speak_of_ball(c, s, speech, m, f, p, distance, kicked):
     speech.ball[f, p, 3] = quantize(vy, c.hear_step_velocity)
 
 
-@njit(cache=True)
+@compiled
 def turn_neck(c, s, f, p, x, y, turn):
     """Turn player p's neck toward a point, as far as it goes, after its body turned by `turn`."""
     own = s.position[f, p, p]

@@ -10,12 +10,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from keepaway_sim import physics, referee, skills, vision
+from keepaway_sim.compiled import compiled, compiled_apart
 from keepaway_sim.config import NEVER, Config, pack
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.geometry import TWO_PI
+from keepaway_sim.geometry import TWO_PI, length
 from keepaway_sim.intercept import cycles_to_ball
 from keepaway_sim.streams import RandomStreams, draw
 from keepaway_sim.task import Action, Outcome, Task
@@ -56,7 +56,7 @@ class World:
         num = task.num_players
         self._constants = pack(task, config)
         self.perceptions = vision.make_perceptions(num_fields, num)
-        self._memory = vision.make_memory(num_fields, num)
+        self._memory = vision.make_memory(self._constants, num_fields)
         self._speech = vision.make_speech(num_fields, num)
         self.state = _make_state(num_fields, num)
         self._radius = np.full(num + 1, config.physics.player_size)
@@ -65,6 +65,11 @@ class World:
         self._bodies = physics.Bodies(num_fields, self._radius, side)
         self._streams = RandomStreams(num_fields, reserve=num * (num + 12) + 16)
         self._touched = np.zeros(num_fields, dtype=np.bool_)
+        self._scratch = (
+            np.zeros((num + 1, 2)),
+            np.zeros(num + 1),
+            np.zeros(num + 1, dtype=np.bool_),
+        )
 
     def start(self, field: int, seed: np.random.SeedSequence) -> None:
         """Give a field a fresh trial with its own random numbers, and kick off.
@@ -110,9 +115,7 @@ class World:
         Raises:
             KeepawayError: a request that its player cannot carry out; nothing was played.
         """
-        illegal = _first_illegal(
-            self._constants, self.state, self.perceptions, action, target
-        )
+        illegal = _first_illegal(self._constants, self.state, self.perceptions, action, target)
         if illegal >= 0:
             self._refuse(illegal, action, target)
         self._streams.refill()
@@ -125,6 +128,7 @@ class World:
             self._speech,
             self._bodies.motion,
             self._bodies.place,
+            self._scratch[0],
             action,
             target,
             *random,
@@ -142,6 +146,7 @@ class World:
             self._bodies.place,
             self._radius,
             self._touched,
+            self._scratch,
             *random,
         )
 
@@ -177,7 +182,7 @@ _MARK = int(Action.MARK_KEEPER)
 _IN_PLAY = int(Outcome.IN_PLAY)
 
 
-@njit(cache=True)
+@compiled
 def is_legal(c, player, action, target):
     """Can this player carry out this request?"""
     if player >= c.num_keepers:
@@ -187,7 +192,7 @@ def is_legal(c, player, action, target):
     return action == _HOLD or action == _OPEN or action == _GO
 
 
-@njit(cache=True)
+@compiled_apart
 def _first_illegal(c, state, s, action, target):
     num = c.num_keepers + c.num_takers
     for f in range(len(state.running)):
@@ -197,7 +202,7 @@ def _first_illegal(c, state, s, action, target):
     return -1
 
 
-@njit(cache=True)
+@compiled_apart
 def _start(c, state, s, m, speech, uniforms, cursor, f):
     """First kick-off of a trial: nothing of an earlier one remains."""
     for p in range(c.num_keepers + c.num_takers):
@@ -212,7 +217,7 @@ def _start(c, state, s, m, speech, uniforms, cursor, f):
     _kick_off(c, state, s, m, speech, uniforms, cursor, f)
 
 
-@njit(cache=True)
+@compiled
 def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
     referee.kick_off(c, state.position[f], state.velocity[f], uniforms, cursor, f)
     state.take_count[f] = 0
@@ -230,11 +235,10 @@ def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
     _perceive(c, state, s, m, speech, uniforms, cursor, f)
 
 
-@njit(cache=True)
-def _act(c, state, s, m, speech, motion, place, action, target, uniforms, cursor):
+@compiled_apart
+def _act(c, state, s, m, speech, motion, place, acceleration, action, target, uniforms, cursor):
     """Requests become commands, commands become this cycle's velocities."""
     num = c.num_keepers + c.num_takers
-    acceleration = np.zeros((num + 1, 2))
     for f in range(len(state.running)):
         if not state.running[f] or s.outcome[f] != _IN_PLAY:
             motion[f, :, 2:] = 0.0
@@ -251,7 +255,7 @@ def _act(c, state, s, m, speech, motion, place, action, target, uniforms, cursor
             motion[f, o, 2], motion[f, o, 3] = vx, vy
 
 
-@njit(cache=True)
+@compiled
 def _take_request(c, state, s, m, f, p, action, target):
     if s.decision_due[f, p]:
         state.action[f, p], state.target[f, p] = action, target
@@ -262,12 +266,10 @@ def _take_request(c, state, s, m, f, p, action, target):
         state.target[f, p] = skills.keeper_of_rank(c, s, f, p, m.pass_rank[f, p])
 
 
-@njit(cache=True)
+@compiled
 def _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor):
     """Player p's command: what p expects of it, says of it, and what the server does with it."""
-    kind, power, angle = skills.command(
-        c, s, m, f, p, state.action[f, p], state.target[f, p]
-    )
+    kind, power, angle = skills.command(c, s, m, f, p, state.action[f, p], state.target[f, p])
     m.command[f, p, 0], m.command[f, p, 1], m.command[f, p, 2] = kind, power, angle
     m.turned[f, p] = skills.expected_turn(c, s, f, p, kind, angle)
     m.kicked[f, p] = False
@@ -280,18 +282,18 @@ def _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor):
         acceleration[p, 1] += ay
     elif kind == skills.TURN:
         noise = 2.0 * draw(uniforms, cursor, f) - 1.0 if c.turn_noise else 0.0
-        speed = math.hypot(state.velocity[f, p, 0], state.velocity[f, p, 1])
+        speed = length(state.velocity[f, p, 0], state.velocity[f, p, 1])
         state.yaw[f, p] = physics.turned_yaw(c, yaw, angle, speed, noise)
     elif kind == skills.KICK:
         _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor)
 
 
-@njit(cache=True)
+@compiled
 def _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor):
     ball = c.num_keepers + c.num_takers
     rel_x = state.position[f, ball, 0] - state.position[f, p, 0]
     rel_y = state.position[f, ball, 1] - state.position[f, p, 1]
-    if math.hypot(rel_x, rel_y) > c.kickable_distance:
+    if length(rel_x, rel_y) > c.kickable_distance:
         return
     m.kicked[f, p] = True
     yaw = state.yaw[f, p]
@@ -299,7 +301,7 @@ def _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor):
     acceleration[ball, 0] += ax
     acceleration[ball, 1] += ay
     if c.kick_rand > 0.0:
-        speed = math.hypot(state.velocity[f, ball, 0], state.velocity[f, ball, 1])
+        speed = length(state.velocity[f, ball, 0], state.velocity[f, ball, 1])
         largest = physics.kick_noise_radius(c, power, rel_x, rel_y, yaw, speed)
         radius = largest * draw(uniforms, cursor, f)
         direction = TWO_PI * draw(uniforms, cursor, f)
@@ -307,7 +309,7 @@ def _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor):
         acceleration[ball, 1] += radius * math.sin(direction)
 
 
-@njit(cache=True)
+@compiled
 def _velocity(c, state, acceleration, f, o, uniforms, cursor):
     vx, vy = state.velocity[f, o]
     ax, ay = acceleration[o]
@@ -322,8 +324,8 @@ def _velocity(c, state, acceleration, f, o, uniforms, cursor):
     )
 
 
-@njit(cache=True)
-def _settle(c, state, s, m, speech, motion, place, radius, touched, uniforms, cursor):
+@compiled_apart
+def _settle(c, state, s, m, speech, motion, place, radius, touched, scratch, uniforms, cursor):
     """After the discs moved: collisions, referee, and what the players perceive of it."""
     num = c.num_keepers + c.num_takers
     for f in range(len(state.running)):
@@ -339,20 +341,18 @@ def _settle(c, state, s, m, speech, motion, place, radius, touched, uniforms, cu
                 state.position[f, o, axis] = motion[f, o, axis] - place[f, axis]
                 state.velocity[f, o, axis] = physics.on_grid(decay * state.velocity[f, o, axis])
         if touched[f]:
-            physics.separate(state.position[f], state.velocity[f], radius)
+            physics.separate(state.position[f], state.velocity[f], radius, *scratch)
         s.cycle[f] += 1
         keeper = referee.near_ball(c, state.position[f], 0, c.num_keepers)
         taker = referee.near_ball(c, state.position[f], c.num_keepers, num)
         if keeper >= 0:
             state.last_keeper[f] = keeper
-        state.take_count[f] = referee.next_take_count(
-            state.take_count[f], keeper >= 0, taker >= 0
-        )
+        state.take_count[f] = referee.next_take_count(state.take_count[f], keeper >= 0, taker >= 0)
         s.outcome[f] = referee.outcome(c, state.position[f], state.take_count[f])
         _perceive(c, state, s, m, speech, uniforms, cursor, f)
 
 
-@njit(cache=True)
+@compiled
 def _perceive(c, state, s, m, speech, uniforms, cursor, f):
     position, velocity, yaw = state.position[f], state.velocity[f], state.yaw[f]
     for p in range(c.num_keepers + c.num_takers):
@@ -366,14 +366,14 @@ def _perceive(c, state, s, m, speech, uniforms, cursor, f):
         _judge(c, s, m, f, p)
 
 
-@njit(cache=True)
+@compiled
 def _judge(c, s, m, f, p):
     """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
     num = c.num_keepers + c.num_takers
     ball, ball_v = s.position[f, p, num], s.velocity[f, p, num]
     known = s.age[f, p, num] <= c.ball_lost_age
     own = s.position[f, p, p]
-    near = math.hypot(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
+    near = length(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
     s.ball_kickable[f, p] = known and near
     s.cycles_to_ball[f, p, :] = NEVER
     if s.ball_kickable[f, p]:

@@ -291,7 +291,7 @@ class Simulator(Node):
         return self._due
 
     def _is_collecting(self, until: float) -> bool:
-        if self._is_reset or self._is_told_to_end() or not self.context.ok():
+        if self._is_reset or self._is_told_to_end():
             return False
         if until < math.inf:
             return time.monotonic() < until
