@@ -1,0 +1,183 @@
+"""Train players in one program, without ROS: the same rules and results, hundreds of times faster.
+
+    .venv/bin/python scripts/train.py --task 3v2 --episodes 8000 --save-weights out/3v2
+    .venv/bin/python scripts/train.py --task 4v3 --trials 20 --episodes 5000 --save-weights out/4v3
+    .venv/bin/python scripts/train.py --policy hand --episodes 2000 --json
+    .venv/bin/python scripts/train.py --policy greedy --load-weights out/3v2 --episodes 2000
+    .venv/bin/python scripts/train.py --taker-policy learn --policy hand --save-weights out/takers
+
+Ctrl-C stops it with all finished trials saved; the same command goes on from there. With --json the
+last line of the output is one JSON object.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from keepaway_agent.errors import AgentError
+from keepaway_agent.trainer import Progress
+from keepaway_agent.training import NUM_FIELDS, Training, TrainingFolder, play
+from keepaway_agent.weights import HOURS_PER_CYCLE
+from keepaway_sim.config import CYCLE_TIME
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.options import add_options
+from keepaway_sim.scores import Score, summary
+from keepaway_sim.task import Outcome
+
+LAST = 1000
+"""Episodes at the end of a trial whose mean says how good it has become."""
+
+Episodes = dict[int, tuple[np.ndarray, np.ndarray]]  # durations [cycles], outcomes by trial
+
+
+def main() -> int:
+    """Train, say how it went; a refusal is one line."""
+    arguments = parse()
+    names = {entry.name for entry in dataclasses.fields(Training)}
+    try:
+        chosen = {name: value for name, value in vars(arguments).items() if name in names}
+        training = Training(**chosen)
+        command = shlex.join(["scripts/train.py", *sys.argv[1:]])
+        folder = (
+            TrainingFolder(arguments.save_weights, training, command)
+            if arguments.save_weights
+            else None
+        )
+        numbers = range(arguments.trials)
+        episodes: Episodes = {k: folder.episodes(k) for k in folder.done} if folder else {}
+        rate = train(
+            training, [k for k in numbers if k not in episodes], arguments, folder, episodes
+        )
+    except (AgentError, KeepawayError, OSError) as error:
+        print(f"train: {error}", file=sys.stderr)
+        return 1
+    asked = {k: episodes[k] for k in range(arguments.trials) if k in episodes}
+    report(training, asked, rate, arguments)
+    if len(asked) < arguments.trials:
+        print("train: stopped; the same command goes on from here", file=sys.stderr)
+        return 130
+    return 0
+
+
+def train(
+    training: Training,
+    numbers: list[int],
+    arguments: argparse.Namespace,
+    folder: TrainingFolder | None,
+    episodes: Episodes,
+) -> float | None:
+    """Play the trials that are missing; Ctrl-C ends it early.
+
+    Returns:
+        Cycles a second once it runs, or None if nothing was played.
+    """
+    meter = Meter(len(numbers))
+    total = len(numbers) * training.episodes
+    with tqdm(total=total, disable=None, unit=" episodes", smoothing=0.05) as bar:
+
+        def watch(progress: Progress) -> None:
+            meter.read(progress)
+            bar.update(progress.episodes - bar.n)
+            bar.set_postfix_str(str(meter))
+
+        try:
+            for result in play(training, numbers, arguments.processes, arguments.fields, watch):
+                if folder:
+                    folder.save(result)
+                episodes[result.trial.label] = result.durations, result.outcomes
+        except KeyboardInterrupt:
+            pass
+    return meter.rate
+
+
+class Meter:
+    """What a person wants to see of the progress."""
+
+    def __init__(self, trials: int) -> None:
+        self.trials = trials
+        self.rate: float | None = None  # [cycles/s]
+        self._progress = Progress()
+        self._first: tuple[float, int] | None = None  # when it ran, and cycles by then
+
+    def read(self, progress: Progress) -> None:
+        """Take a reading; compiling and starting, before the first one, do not count."""
+        now, self._progress = time.perf_counter(), progress
+        begun, cycles = self._first = self._first or (now, progress.cycles)
+        if progress.cycles > cycles:
+            self.rate = (progress.cycles - cycles) / (now - begun)
+
+    def __str__(self) -> str:
+        done = self._progress
+        mean = done.cycles / max(1, done.episodes) * CYCLE_TIME
+        return (
+            f"{done.trials}/{self.trials} trials, {done.cycles * HOURS_PER_CYCLE:.1f} simulated"
+            f" hours, mean {mean:.1f} s, {self.rate or 0:,.0f} cycles/s"
+        )
+
+
+def report(
+    training: Training, episodes: Episodes, rate: float | None, arguments: argparse.Namespace
+) -> None:
+    """Print how the episodes went."""
+    scores = [
+        Score(float(cycles) * CYCLE_TIME, Outcome(outcome))
+        for durations, outcomes in episodes.values()
+        for cycles, outcome in zip(durations, outcomes, strict=True)
+    ]
+    ends = [durations[-LAST:].mean() * CYCLE_TIME for durations, _ in episodes.values()]
+    numbers: dict[str, Any] = {
+        "task": training.task,
+        **summary(scores),
+        "last_mean_duration_s": float(np.mean(ends)) if ends else None,
+        "trials": len(episodes),
+        "simulated_hours": sum(score.duration for score in scores) / 3600,
+        "cycles_per_second": rate,
+        "seed": training.seed,
+        "policy": training.policy,
+        "taker_policy": training.taker_policy,
+    }
+    if arguments.json:
+        print(json.dumps(numbers))
+    elif scores:
+        print(
+            f"{training.task}, {training.policy} keepers, {training.taker_policy} takers:"
+            f" {len(scores):,} episodes in {len(episodes)} trials,"
+            f" {numbers['simulated_hours']:.1f} simulated hours\n"
+            f"mean hold time {numbers['mean_duration_s']:.2f} s"
+            f" +- {numbers['sem_duration_s'] or math.nan:.2f} (standard error),"
+            f" last {LAST} episodes of a trial {numbers['last_mean_duration_s']:.2f} s,"
+            f" out of bounds {numbers['out_of_bounds_share']:.0%}"
+            + (f"\n{rate:,.0f} cycles a second" if rate else "")
+        )
+
+
+def parse() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--trials", type=int, default=1, help="each from the start (default 1)")
+    parser.add_argument("--save-weights", type=Path, metavar="DIR", help="folder of the results")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="to spread over")
+    parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="side by side in a process")
+    parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
+    add_options(parser, Training)
+    arguments = parser.parse_args()
+    for name in ("trials", "processes", "fields"):
+        if getattr(arguments, name) < 1:
+            parser.error(f"--{name} {getattr(arguments, name)}: give 1 or more")
+    return arguments
+
+
+if __name__ == "__main__":
+    sys.exit(main())
