@@ -18,7 +18,6 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
@@ -26,7 +25,7 @@ from tqdm import tqdm
 from keepaway_agent.errors import AgentError
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
-from keepaway_transfer.batch import NUM_FIELDS, play
+from keepaway_transfer.batch import play
 from keepaway_transfer.experiment import Progress, run
 from keepaway_transfer.results import open_results
 from keepaway_transfer.study import Study, load_study
@@ -66,8 +65,7 @@ def _run(study: Study, arguments: argparse.Namespace) -> None:
     ):
         progress = Progress(study, results.done)
         with tqdm(total=progress.trials, initial=progress.done, disable=None, unit="trial") as bar:
-            play_some = partial(play, num_fields=arguments.fields)
-            for trial in run(study, results, executor, play_some, arguments.batch):
+            for trial in run(study, results, executor, play, arguments.batch):
                 progress.add(trial)
                 bar.update()
                 if bar.disable:
@@ -98,8 +96,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--trials", type=int, help="trials a row; default the study's")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--scheduler", help="address of a Dask scheduler, instead of processes")
-    parser.add_argument("--batch", type=int, default=2 * NUM_FIELDS, help="trials played together")
-    parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="of them in lock-step")
+    parser.add_argument("--batch", type=int, default=25, help="trials played together")
     parser.add_argument("--resume", action="store_true", help="go on with results that are there")
     parser.add_argument("--any-code", action="store_true", help="also if the code has changed")
     return parser.parse_args()

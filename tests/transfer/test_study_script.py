@@ -5,21 +5,17 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
-from distributed import Client, LocalCluster
+from distributed import LocalCluster
 
-from keepaway_transfer.batch import play
-from keepaway_transfer.experiment import run
-from keepaway_transfer.results import open_results, read_results
+from keepaway_transfer.results import read_results
 from keepaway_transfer.study import load_study
 
 SCRIPT = Path(__file__).parents[2] / "scripts/study.py"
 TINY = load_study("tiny")
+pytestmark = pytest.mark.timeout(1200)  # the first trial on a machine waits for the compiler
 
 
 def command(*arguments):
@@ -72,21 +68,16 @@ def test_results_in_the_way_are_refused_in_one_line(whole):
     assert "add --resume to go on, or name another folder" in done.stderr
 
 
-def test_a_cluster_gives_the_same_results(whole, tmp_path):
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        Client(cluster) as client,
-        client.get_executor() as executor,
-        open_results(tmp_path, TINY, command="x", code_version="v1") as results,
-    ):
-        list(run(TINY, results, executor, partial(play, num_fields=2), batch=2))
-    assert trials_in(tmp_path) == trials_in(whole[0])
-
-
 def test_two_processes_give_the_same_results(whole, tmp_path):
-    with (
-        ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor,
-        open_results(tmp_path, TINY, command="x", code_version="v1") as results,
-    ):
-        list(run(TINY, results, executor, partial(play, num_fields=3), batch=3))
-    assert trials_in(tmp_path) == trials_in(whole[0])
+    done = study("--out", tmp_path / "two", "--workers", 2, "--batch", 3)
+    assert done.returncode == 0, done.stderr
+    assert trials_in(tmp_path / "two") == trials_in(whole[0])
+
+
+def test_a_cluster_of_two_workers_gives_the_same_results(whole, tmp_path):
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        done = study(
+            "--out", tmp_path / "x", "--scheduler", cluster.scheduler_address, "--batch", 2
+        )
+    assert done.returncode == 0, done.stderr
+    assert trials_in(tmp_path / "x") == trials_in(whole[0])

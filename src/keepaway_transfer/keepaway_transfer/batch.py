@@ -7,7 +7,7 @@ the last. What a trial gives depends on the study's settings, its row and its nu
 
 import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +23,6 @@ from keepaway_transfer.results import SourceRun, Trial
 from keepaway_transfer.rho import VARIANTS, Transfer, rho
 from keepaway_transfer.study import Row, Study
 
-NUM_FIELDS = 64  # played in lock-step
 CYCLES_PER_HOUR = SECONDS_PER_HOUR / CYCLE_TIME
 GREEDY, CHOICE, SHUFFLE = 100, 101, 102  # seeds of what is no stage: after any number of stages
 
@@ -41,15 +40,15 @@ class _Life:
     greedy_cycles: tuple[int, ...] = ()
 
 
-def play(study: Study, keys: Sequence[Key], num_fields: int = NUM_FIELDS) -> list[Trial]:
+def play(study: Study, keys: Sequence[Key]) -> list[Trial]:
     """Play these trials to their end; the results are in the order of the keys."""
     rows = {row.name: row for row in study.rows}
     lives = [_Life(rows[name], number) for name, number in keys]
     for stage in range(max((len(life.row.stages) for life in lives), default=0)):
-        _train_sources(study, [x for x in lives if len(x.row.stages) > stage], stage, num_fields)
-    _train_target(study, lives, num_fields)
+        _train_sources(study, [x for x in lives if len(x.row.stages) > stage], stage)
+    _train_target(study, lives)
     if study.greedy_episodes:
-        _play_greedily(study, lives, num_fields)
+        _play_greedily(study, lives)
     return [
         Trial(
             row=life.row.name,
@@ -63,7 +62,7 @@ def play(study: Study, keys: Sequence[Key], num_fields: int = NUM_FIELDS) -> lis
     ]
 
 
-def _train_sources(study: Study, lives: Sequence[_Life], stage: int, num_fields: int) -> None:
+def _train_sources(study: Study, lives: Sequence[_Life], stage: int) -> None:
     """Train a source stage of all lives, and carry what was learned to their next task."""
     by_run: dict[tuple[str, str, int], list[_Life]] = defaultdict(list)
     for life in lives:
@@ -73,7 +72,7 @@ def _train_sources(study: Study, lives: Sequence[_Life], stage: int, num_fields:
     for label, sharing in by_run.items():
         runs[label[0]].append(_source_run(study, label, sharing, stage))
     for task, of_task in runs.items():
-        for result in _results(study, task, of_task, num_fields):
+        for result in _results(study, task, of_task):
             for life in by_run[result.trial.label]:
                 _carry(study, life, stage, result)
 
@@ -122,14 +121,14 @@ def _through_rho(
     )
 
 
-def _train_target(study: Study, lives: Sequence[_Life], num_fields: int) -> None:
+def _train_target(study: Study, lives: Sequence[_Life]) -> None:
     stop = StopRule(
         max_cycles=round(study.max_hours * CYCLES_PER_HOUR),
         threshold=study.threshold,
         window=study.window,
         min_cycles=round(study.min_hours * CYCLES_PER_HOUR),
     )
-    runs = (
+    runs = [
         Run(
             seed=_seed(study, life.row.name, life.number, len(life.row.stages)),
             stop=stop,
@@ -137,18 +136,18 @@ def _train_target(study: Study, lives: Sequence[_Life], num_fields: int) -> None
             label=life,
         )
         for life in lives
-    )
-    for result in _results(study, study.target, runs, num_fields):
+    ]
+    for result in _results(study, study.target, runs):
         life = result.trial.label
         life.cycles, life.learned = tuple(result.durations.tolist()), result.keeper_weights
 
 
-def _play_greedily(study: Study, lives: Sequence[_Life], num_fields: int) -> None:
+def _play_greedily(study: Study, lives: Sequence[_Life]) -> None:
     """Play on without learning or exploring, up to the target task's limit of hours."""
     stop = StopRule(
         max_episodes=study.greedy_episodes, max_cycles=round(study.max_hours * CYCLES_PER_HOUR)
     )
-    runs = (
+    runs = [
         Run(
             seed=_seed(study, life.row.name, life.number, GREEDY),
             stop=stop,
@@ -157,15 +156,14 @@ def _play_greedily(study: Study, lives: Sequence[_Life], num_fields: int) -> Non
             label=life,
         )
         for life in lives
-    )
-    for result in _results(study, study.target, runs, num_fields):
+    ]
+    for result in _results(study, study.target, runs):
         result.trial.label.greedy_cycles = tuple(result.durations.tolist())
 
 
-def _results(
-    study: Study, task: str, runs: Iterable[Run], num_fields: int
-) -> Iterator[TrialResult]:
-    return Trainer(_config(study, task), num_fields).run(runs)
+def _results(study: Study, task: str, runs: Sequence[Run]) -> Iterator[TrialResult]:
+    """Play runs of one task, all at once."""
+    return Trainer(_config(study, task), len(runs)).run(runs)
 
 
 def _config(study: Study, task: str) -> TrainerConfig:
