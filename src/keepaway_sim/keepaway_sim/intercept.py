@@ -12,6 +12,7 @@ import math
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
 from keepaway_sim.geometry import clip, length, rolling, wrap
+from keepaway_sim.physics import limited
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
@@ -25,7 +26,9 @@ MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 @compiled
 def dash_power(c, along, speed_along, cycles):
     """Power of the dash that covers `along` metres ahead in `cycles` (P: getPowerForDash)."""
-    wanted = min(along / rolling(c.player_decay, cycles), c.player_speed_max)
+    wanted = c.player_speed_max
+    if along * (1.0 - c.player_decay) < c.player_speed_max:  # else too far for any `cycles`
+        wanted = min(along / rolling(c.player_decay, cycles), wanted)
     return clip((wanted - speed_along) / c.dash_power_rate, -100.0, 100.0)
 
 
@@ -36,11 +39,16 @@ def turn_moment(c, angle, speed):
 
 
 @compiled
-def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
-    """Moment of the turn needed before running to a point; 0.0 if none is.
+def turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
+    """Angle by which a player wants to turn before it runs to a point; 0.0 if it need not.
 
     A player turns while the point lies off the line of its body, or behind it and further than
     `back_distance` (P: predictCommandTurnTowards).
+
+    Args:
+        x, y, vx, vy: the player's position [m] and velocity [m/cycle].
+        ux, uy: unit vector of its body direction.
+        to_x, to_y, cycles: the point, and the time there is to reach it.
     """
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
     rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
@@ -48,62 +56,66 @@ def turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, cycles, back_distance):
     ratio = 3.0 if away > 20.0 else (2.0 if away > 10.0 else 0.9)
     allowed = ratio * c.kickable_distance
     rest = length(rel_x, rel_y)
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    if not _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
+    along, across = ux * rel_x + uy * rel_y, ux * rel_y - uy * rel_x
+    if not _off(along, across, rest, allowed, back_distance):
         return 0.0
-    angle = wrap(math.atan2(rel_y, rel_x) - yaw)
-    speed = length(vx, vy)
-    moment = turn_moment(c, angle, speed)
+    angle = math.atan2(across, along)
     if cycles < 4 and rest < back_distance:
-        reached = yaw + moment / (1.0 + c.inertia_moment * speed)
-        cosine, sine = math.cos(reached), math.sin(reached)
-        if _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
-            back = turn_moment(c, wrap(angle + math.pi), speed)
-            reached = yaw + back / (1.0 + c.inertia_moment * speed)
-            across = abs(math.cos(reached) * rel_y - math.sin(reached) * rel_x)
-            if across < 0.9 * c.kickable_distance:
+        back = wrap(angle + math.pi)
+        left = angle - _achieved(c, angle, vx, vy)
+        if _off(rest * math.cos(left), rest * math.sin(left), rest, allowed, back_distance):
+            left = angle - _achieved(c, back, vx, vy)
+            if abs(rest * math.sin(left)) < 0.9 * c.kickable_distance:
                 return back
-    return moment
+    return angle
 
 
 @compiled
-def _off(cosine, sine, rel_x, rel_y, rest, allowed, back_distance):
-    across = abs(cosine * rel_y - sine * rel_x)
-    behind = cosine * rel_x + sine * rel_y < 0.0
-    return across > allowed or (behind and rest > back_distance)
+def _off(along, across, rest, allowed, back_distance):
+    return abs(across) > allowed or (along < 0.0 and rest > back_distance)
 
 
 @compiled
-def reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
+def _achieved(c, angle, vx, vy):
+    """How far of `angle` a moving player turns in one cycle."""
+    most = math.pi / (1.0 + c.inertia_moment * length(vx, vy))
+    return clip(angle, -most, most)
+
+
+@compiled
+def _turned(c, ux, uy, angle, vx, vy):
+    """The body's unit vector after a cycle of turning toward `angle`."""
+    turn = _achieved(c, angle, vx, vy)
+    cosine, sine = math.cos(turn), math.sin(turn)
+    return cosine * ux - sine * uy, sine * ux + cosine * uy
+
+
+@compiled
+def reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
     """Distance to a point that is left after `cycles` of going there (P: intercept loop)."""
-    cosine, sine = math.cos(yaw), math.sin(yaw)
     turning = True
     for k in range(cycles):
         left = cycles - k
-        power = 0.0
         if turning:
-            moment = turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, left, c.back_dash_distance)
-            if moment != 0.0:
-                yaw += moment / (1.0 + c.inertia_moment * length(vx, vy))
-                cosine, sine = math.cos(yaw), math.sin(yaw)
-            else:
-                turning = False
+            angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, left, c.back_dash_distance)
+            turning = angle != 0.0
+            if turning:
+                ux, uy = _turned(c, ux, uy, angle, vx, vy)
         if not turning:
-            along = cosine * (to_x - x) + sine * (to_y - y)
-            power = dash_power(c, along, cosine * vx + sine * vy, left)
-            vx += c.dash_power_rate * power * cosine
-            vy += c.dash_power_rate * power * sine
-            speed = length(vx, vy)
-            if speed > c.player_speed_max:
-                vx *= c.player_speed_max / speed
-                vy *= c.player_speed_max / speed
+            along = ux * (to_x - x) + uy * (to_y - y)
+            power = dash_power(c, along, ux * vx + uy * vy, left)
+            vx, vy = limited(
+                vx + c.dash_power_rate * power * ux,
+                vy + c.dash_power_rate * power * uy,
+                c.player_speed_max,
+            )
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
     return length(to_x - x, to_y - y)
 
 
 @compiled
-def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
+def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old):
     """Cycles until a player can meet the ball, and where.
 
     Args:
@@ -116,7 +128,7 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
     first, first_x, first_y = NEVER, 0.0, 0.0
     kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
     speed = length(ball_v[0], ball_v[1])
-    i = 0
+    i = _straight_run(c, x, y, vx, vy, ball, ball_v) if not has_old else 0
     while i <= c.intercept_horizon:
         roll = rolling(c.ball_decay, i)
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
@@ -125,7 +137,7 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
         candidate = moving and off < kept_off
         skip = 1
         if first == NEVER or candidate:
-            left = _left_after(c, x, y, vx, vy, yaw, bx, by, i)
+            left = _left_after(c, x, y, vx, vy, ux, uy, bx, by, i)
             if first == NEVER and left < c.kickable_distance:
                 first, first_x, first_y = i, bx, by
             if candidate and left < SAFE_SHARE * c.kickable_distance:
@@ -144,13 +156,13 @@ def meeting_cycles(c, x, y, vx, vy, yaw, ball, ball_v, old_x, old_y, has_old):
 
 
 @compiled
-def _left_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles):
+def _left_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
     """`reach_after`, but only a lower bound where the point is out of question."""
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
     rest = length(to_x - x - roll * vx, to_y - y - roll * vy)
     if rest / c.player_speed_max > cycles + c.kickable_distance:
         return rest - cycles * c.player_speed_max
-    return reach_after(c, x, y, vx, vy, yaw, to_x, to_y, cycles)
+    return reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles)
 
 
 @compiled
@@ -176,38 +188,57 @@ def run_cycles(c, distance, speed):
 
 
 @compiled
-def cycles_to_point(c, x, y, vx, vy, yaw, to_x, to_y):
+def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
     """Cycles a player needs to bring a point within kicking distance (turns included)."""
     cycles = 0
     for _ in range(5):
         if length(to_x - x, to_y - y) < c.kickable_distance:
             return cycles
-        moment = turn_to_go(c, x, y, vx, vy, yaw, to_x, to_y, 1, c.back_dash_distance)
-        if moment == 0.0:
+        angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)
+        if angle == 0.0:
             break
-        yaw += moment / (1.0 + c.inertia_moment * length(vx, vy))
+        ux, uy = _turned(c, ux, uy, angle, vx, vy)
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
         cycles += 1
-    speed = math.cos(yaw) * vx + math.sin(yaw) * vy
-    return cycles + run_cycles(c, length(to_x - x, to_y - y), speed)
+    return cycles + run_cycles(c, length(to_x - x, to_y - y), ux * vx + uy * vy)
 
 
 @compiled
-def cycles_to_ball(c, x, y, vx, vy, yaw, ball, ball_v):
+def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
     """Cycles a player needs to reach the moving ball; NEVER beyond the horizon.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
-    (P: getFastestInSetTo). Cycles are skipped in which it cannot be: the gap between cycles
-    needed and cycles passed closes by no more than one plus the ball's speed a cycle.
+    (P: getFastestInSetTo). Cycles are skipped in which it cannot be.
     """
     speed = length(ball_v[0], ball_v[1])
-    i = max(int(length(ball[0] - x, ball[1] - y) / (c.player_speed_max + speed)) - 1, 0)
+    if speed < STILL:
+        return cycles_to_point(c, x, y, vx, vy, ux, uy, ball[0], ball[1])
+    i = _straight_run(c, x, y, vx, vy, ball, ball_v)
     while i < 2 * c.intercept_horizon:
         roll = rolling(c.ball_decay, i)
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
-        needed = cycles_to_point(c, x, y, vx, vy, yaw, bx, by)
-        if needed <= i or speed < STILL:
+        needed = cycles_to_point(c, x, y, vx, vy, ux, uy, bx, by)
+        if needed <= i:
             return needed
         i += max(int((needed - i) / (1.0 + speed)), 1)
     return NEVER
+
+
+@compiled
+def _straight_run(c, x, y, vx, vy, ball, ball_v):
+    """Cycles before which nobody reaches the ball, even running straight without a turn.
+
+    The gap between cycles needed and cycles passed closes by no more than one plus the ball's
+    speed a cycle, so several may be skipped at once.
+    """
+    speed, own = length(ball_v[0], ball_v[1]), length(vx, vy)
+    i = 0
+    while i < 2 * c.intercept_horizon:
+        roll = rolling(c.ball_decay, i)
+        rel_x, rel_y = ball[0] + roll * ball_v[0] - x, ball[1] + roll * ball_v[1] - y
+        gap = run_cycles(c, length(rel_x, rel_y) - 2.0 * own, own) - i
+        if gap <= 0:
+            return i
+        i += max(int(gap / (1.0 + speed)), 1)
+    return i

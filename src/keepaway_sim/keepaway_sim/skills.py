@@ -484,6 +484,7 @@ def intercept(c, s, m, f, p):
     ball = c.num_keepers + c.num_takers
     x, y = s.position[f, p, p]
     vx, vy = s.velocity[f, p, p]
+    ux, uy = math.cos(s.body[f, p, p]), math.sin(s.body[f, p, p])
     now = s.cycle[f]
     has_old = m.intercept_cycle[f, p] >= now - 2
     cycles, to_x, to_y = meeting_cycles(
@@ -492,7 +493,8 @@ def intercept(c, s, m, f, p):
         y,
         vx,
         vy,
-        s.body[f, p, p],
+        ux,
+        uy,
         s.position[f, p, ball],
         s.velocity[f, p, ball],
         m.intercept_point[f, p, 0],
@@ -508,9 +510,9 @@ def intercept(c, s, m, f, p):
     roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
     if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
         return turn_body_along(c, s, f, p, direction_of_play(c, p))
-    moment = turn_to_go(c, x, y, vx, vy, s.body[f, p, p], to_x, to_y, cycles, c.back_dash_distance)
-    if moment != 0.0:
-        return TURN, 0.0, moment
+    angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
+    if angle != 0.0:
+        return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
     return dash_to(c, s, f, p, to_x, to_y, max(cycles, 1))
 
 

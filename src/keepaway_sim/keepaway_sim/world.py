@@ -383,8 +383,7 @@ def _judge(c, s, m, f, p):
             if j == p or s.age[f, p, j] <= c.player_lost_age:
                 x, y = s.position[f, p, j]
                 vx, vy = s.velocity[f, p, j]
-                s.cycles_to_ball[f, p, j] = cycles_to_ball(
-                    c, x, y, vx, vy, s.body[f, p, j], ball, ball_v
-                )
+                ux, uy = math.cos(s.body[f, p, j]), math.sin(s.body[f, p, j])
+                s.cycles_to_ball[f, p, j] = cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v)
     passing = m.pass_cycle[f, p] == s.cycle[f] - 1 and s.ball_kickable[f, p]
     s.decision_due[f, p] = s.outcome[f] == _IN_PLAY and not passing
