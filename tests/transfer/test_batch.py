@@ -106,6 +106,14 @@ def test_rows_that_share_their_sources_take_them_from_one_run_as_it_goes(runs):
     assert alone == [four]
 
 
+def test_keepers_that_share_a_value_function_end_with_equal_weights(runs):
+    play(dataclasses.replace(TINY, shared_keepers=True), [("0", 0)])
+    first, second, third = runs[0][1].keeper_weights
+    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(first, third)
+    assert first.any()
+
+
 def test_shuffled_trials_have_shuffles_of_their_own(runs):
     rows = (Row("0"), Row("shuffled", (Stage("2v1", 4),), "shuffled"))
     study = dataclasses.replace(TINY, rows=rows, shared_sources=True)

@@ -137,6 +137,12 @@ def test_a_report_of_few_trials_has_no_comparison_but_a_table(tmp_path):
     assert "| 0 | 1 | 1 |" in text
 
 
+def test_a_study_of_scratch_alone_has_a_report(tmp_path):
+    text = write_report(results(trial("0", 0, 6), trial("0", 1, 7)), tmp_path)
+    assert "| 0 | 2 | 2 | 0.00 | 6.00 [" in text
+    assert "Against row" not in text
+
+
 def test_equal_results_give_equal_tables(worked, tmp_path):
     assert write_report(worked, tmp_path / "a") == write_report(worked, tmp_path / "b")
 

@@ -173,6 +173,7 @@ def _config(study: Study, task: str) -> TrainerConfig:
         sarsa=study.sarsa,
         ordering=study.ordering,
         tile_widths=study.widths,
+        shared=study.shared_keepers,
     )
 
 

@@ -47,7 +47,8 @@ def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
         " Kaplan-Meier curve, the others by bootstrap).",
     ]
     for reference in study.references:
-        lines += ["", *_comparison_table(rows, reference)]
+        if any(reference in row.against for row in rows):
+            lines += ["", *_comparison_table(rows, reference)]
     return "\n".join(lines) + "\n"
 
 

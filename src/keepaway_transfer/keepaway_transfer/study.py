@@ -73,6 +73,7 @@ class Study:
     world: Mapping[str, float] = dataclasses.field(
         default_factory=dict
     )  # constants changed by name
+    shared_keepers: bool = False  # do all keepers of a team learn one value function?
     ordering: str = "ball"  # of the players in the state variables
     widths: str = "default"  # profile of tile widths
     learner: Mapping[str, float] = dataclasses.field(
