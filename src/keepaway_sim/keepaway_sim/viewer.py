@@ -11,6 +11,7 @@ import functools
 import html
 import json
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -165,7 +166,7 @@ def page(data: Mapping[str, Any]) -> str:
         "title": html.escape(f"Keepaway {match['task']}" if match else "Keepaway, live"),
         "css": _part("page.css"),
         "script": _part("page.js"),
-        "data": json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
+        "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
     }
     made = _part("page.html")
     for name, text in parts.items():
@@ -274,7 +275,9 @@ def _draw_intent(axes: Axes, track: Track, row: int, player: int, task: Task) ->
 def _draw_view(axes: Axes, at: np.ndarray, face: float, angle: float, colour: str) -> None:
     half = math.degrees(angle) / 2
     middle = math.degrees(face)
-    axes.add_patch(Wedge(at, 60.0, middle - half, middle + half, fc=colour, alpha=0.1, zorder=1))
+    axes.add_patch(
+        Wedge((at[0], at[1]), 60.0, middle - half, middle + half, fc=colour, alpha=0.1, zorder=1)
+    )
 
 
 def _draw_player(axes: Axes, at: np.ndarray, yaw: float, colour: str, label: str) -> None:
@@ -316,11 +319,10 @@ def numbers_in(text: str) -> set[int]:
     """
     numbers: set[int] = set()
     for part in text.split(","):
-        first, _, last = part.partition("-")
-        try:
-            numbers |= set(range(int(first), int(last or first) + 1))
-        except ValueError:
-            raise KeepawayError(f"{text!r}: write numbers like 7 or 3-9 or 0,5,10-12") from None
+        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        if not found:
+            raise KeepawayError(f"{text!r}: write numbers like 7 or 3-9 or 0,5,10-12")
+        numbers |= set(range(int(found[1]), int(found[2] or found[1]) + 1))
     return numbers
 
 
