@@ -189,13 +189,14 @@ class Trainer:
             for number in fields:
                 self._start_next(number, waiting)
             for cycle in itertools.count(1):
+                self._decide(0, len(fields))
                 for number in self._fields_at_an_end():
                     if result := self._end_episode(number):
                         self._start_next(number, waiting)
+                        self._decide(number, number + 1)
                         yield result
                 if not self._world.state.running.any():
                     return
-                self._decide()
                 self._world.step(self._action, self._target)
                 if watch and cycle % WATCH_INTERVAL == 0:
                     watch(self.progress)
@@ -221,23 +222,20 @@ class Trainer:
         self._cycles_left[number] = trial.stop.max_cycles or _ENDLESS
         self._world.start(number, _child(trial.seed, 0))
 
-    def _fields_at_an_end(self) -> Iterable[int]:
+    def _fields_at_an_end(self) -> list[int]:
         """Fields whose episode is over, or whose trial has used up its cycles."""
         seen = self._world.perceptions
-        over = (seen.outcome != Outcome.IN_PLAY) | (seen.cycle >= self._cycles_left)
-        return map(int, np.flatnonzero(over & self._world.state.running))
+        over = (seen.outcome != _IN_PLAY) | (seen.cycle >= self._cycles_left)
+        ended: list[int] = np.flatnonzero(over & self._world.state.running).tolist()
+        return ended
 
     def _end_episode(self, number: int) -> TrialResult | None:
-        """Pay the players of a field for an episode; the trial's result if that was its last."""
+        """Take note of a field's episode; the trial's result if that was its last."""
         life = self._lives[number]
         assert life is not None
-        seen = self._world.perceptions
-        cycle, outcome = int(seen.cycle[number]), int(seen.outcome[number])
-        if outcome == Outcome.IN_PLAY:
-            outcome = Outcome.ABORTED
-        learners = self._teams[Role.KEEPER].learners, self._teams[Role.TAKER].learners
-        end_field(number, cycle, outcome, *learners, self._policy, self.config.task.num_keepers)
-        if outcome != Outcome.ABORTED:
+        cycle = int(self._world.perceptions.cycle[number])
+        outcome = int(self._world.perceptions.outcome[number])
+        if outcome != _IN_PLAY:
             life.count(cycle, outcome)
             self.progress.episodes += 1
             self.progress.cycles += cycle
@@ -262,10 +260,12 @@ class Trainer:
             snapshots=life.snapshots,
         )
 
-    def _decide(self) -> None:
-        """Let every player answer whose answer is due."""
+    def _decide(self, first: int, last: int) -> None:
+        """Let players of fields first..last-1 answer, and pay those whose episode is over."""
         self._streams.refill()
         decide_all(
+            first,
+            last,
             self._world.perceptions,
             self._teams[Role.KEEPER].learners,
             self._teams[Role.TAKER].learners,
@@ -280,6 +280,7 @@ class Trainer:
         )
 
 
+_IN_PLAY: Final = int(Outcome.IN_PLAY)
 _ENDLESS: Final = np.iinfo(np.int64).max
 _LEARNED: Final = ("learn", "greedy")
 
@@ -372,6 +373,8 @@ def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:
 
 @compiled
 def decide_all(
+    first,
+    last,
     perceptions,
     keepers,
     takers,
@@ -384,9 +387,11 @@ def decide_all(
     action,
     target,
 ):
-    """Let every player of every field answer whose answer is due.
+    """Let every player answer whose answer is due, and pay those whose episode is over.
 
     Args:
+        first: the first of the fields that are looked at.
+        last: one past the last of them.
         perceptions: of the World.
         keepers: Learners, num_keepers rows for each field.
         takers: Learners, num_takers rows for each field.
@@ -399,10 +404,18 @@ def decide_all(
         action: (num_fields, num_players) int64, written.
         target: (num_fields, num_players) int64, written.
     """
-    num_fields, num_players = policy.shape
-    n = keeper.num_keepers
-    for f in range(num_fields):
+    num_players, n = policy.shape[1], keeper.num_keepers
+    m = num_players - n
+    for f in range(first, last):
+        outcome, cycle = perceptions.outcome[f], perceptions.cycle[f]
         for p in range(num_players):
+            team = keeper if p < n else taker
+            player = Player(p, n, policy[f, p], team.ordering, team.interval)
+            if outcome != Outcome.IN_PLAY:
+                if p < n:
+                    end_episode(keepers, f * n + p, player, cycle, outcome)
+                else:
+                    end_episode(takers, f * m + p - n, player, cycle, outcome)
             if not perceptions.decision_due[f, p]:
                 continue
             view = View(
@@ -410,31 +423,15 @@ def decide_all(
                 perceptions.age[f, p],
                 perceptions.cycles_to_ball[f, p],
                 perceptions.ball_kickable[f, p],
-                perceptions.cycle[f],
+                cycle,
             )
             stream = f * num_players + p
-            first = cursor[stream]
-            draws = uniforms[stream, first : first + UNIFORMS_PER_CHOICE]
+            at = cursor[stream]
+            draws = uniforms[stream, at : at + UNIFORMS_PER_CHOICE]
             if p < n:
-                player = Player(p, n, policy[f, p], keeper.ordering, keeper.interval)
                 answer = keeper_decision(keepers, f * n + p, player, view, draws, order)
             else:
-                player = Player(p, n, policy[f, p], taker.ordering, taker.interval)
-                i = f * (num_players - n) + p - n
-                answer = taker_decision(takers, i, player, view, draws, order)
+                answer = taker_decision(takers, f * m + p - n, player, view, draws, order)
             action[f, p], target[f, p], chose = answer
             if chose:
-                cursor[stream] = first + UNIFORMS_PER_CHOICE
-
-
-@compiled
-def end_field(number, cycle, outcome, keepers, takers, policy, num_keepers):
-    """Tell every player of a field that its episode is over; arguments as in `decide_all`."""
-    num_players = policy.shape[1]
-    for p in range(num_players):
-        player = Player(p, num_keepers, policy[number, p], 0, 1)
-        if p < num_keepers:
-            end_episode(keepers, number * num_keepers + p, player, cycle, outcome)
-        else:
-            i = number * (num_players - num_keepers) + p - num_keepers
-            end_episode(takers, i, player, cycle, outcome)
+                cursor[stream] = at + UNIFORMS_PER_CHOICE
