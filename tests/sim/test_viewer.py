@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.patches import Circle
 
 from keepaway_sim.episodes import EpisodeSummary, MatchBag, Track
 from keepaway_sim.errors import KeepawayError
@@ -148,12 +149,8 @@ def test_a_picture_shows_everybody_where_they_were(
 ) -> None:
     figure = picture(track, 10, bag.task, visible_angle=1.57, player=0)
     axes = figure.axes[0]
-    centres = [
-        patch.center
-        for patch in axes.patches
-        if type(patch).__name__ == "Circle" and patch.get_fill()
-    ]
+    discs = [patch for patch in axes.patches if isinstance(patch, Circle) and patch.get_fill()]
     for place in track.position[10]:
-        assert any(np.allclose(place, centre) for centre in centres)
+        assert any(np.allclose(place, disc.center) for disc in discs)
     figure.savefig(tmp_path / "moment.png")
     assert (tmp_path / "moment.png").stat().st_size > 10_000
