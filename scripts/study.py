@@ -26,11 +26,13 @@ from keepaway_agent.errors import AgentError
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
 from keepaway_transfer.batch import play
-from keepaway_transfer.experiment import Progress, run
+from keepaway_transfer.experiment import Progress, end_with_parent, run
 from keepaway_transfer.results import open_results
 from keepaway_transfer.study import Study, load_study
 
 log = logging.getLogger("study")
+
+BAR = "{percentage:3.0f}% {bar} {postfix}"
 
 
 def main() -> int:
@@ -45,9 +47,6 @@ def main() -> int:
     except (AgentError, KeepawayError, OSError) as error:
         print(f"study: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
-        return 130
     return 0
 
 
@@ -64,12 +63,17 @@ def _run(study: Study, arguments: argparse.Namespace) -> None:
         _executor(arguments) as executor,
     ):
         progress = Progress(study, results.done)
-        with tqdm(total=progress.trials, initial=progress.done, disable=None, unit="trial") as bar:
+        bar = tqdm(total=progress.trials, initial=progress.done, disable=None, bar_format=BAR)
+        try:
             for trial in run(study, results, executor, play, arguments.batch):
                 progress.add(trial)
                 bar.update()
-                if bar.disable:
+                bar.set_postfix_str(str(progress))
+                if bar.disable:  # the output is no terminal
                     log.info("%s", progress)
+        except KeyboardInterrupt:
+            print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
+            os._exit(130)  # without waiting for batches: what is done is on the disk
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
 
 
@@ -83,7 +87,9 @@ def _executor(arguments: argparse.Namespace) -> Iterator[Executor]:
             yield executor
     else:
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(arguments.workers, mp_context=context) as executor:
+        with ProcessPoolExecutor(
+            arguments.workers, mp_context=context, initializer=end_with_parent
+        ) as executor:
             yield executor
 
 

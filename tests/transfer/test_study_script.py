@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil  # type: ignore[import-untyped]  # comes with distributed
 import pytest
 from distributed import LocalCluster
 
@@ -47,14 +48,18 @@ def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
     assert head["study"]["seed"] == TINY.seed
 
 
-def test_a_run_that_was_killed_goes_on_to_the_same_results(whole, tmp_path):
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_a_run_that_was_stopped_goes_on_to_the_same_results(whole, tmp_path, how, code):
     log = tmp_path / "cut" / "trials.jsonl"
     arguments = ("--out", log.parent, "--batch", 1)
     with subprocess.Popen(command(*arguments), stderr=subprocess.DEVNULL) as running:
         while not log.exists() or log.read_bytes().count(b"\n") < 2:
             assert running.poll() is None
             time.sleep(0.01)
-        running.send_signal(signal.SIGKILL)
+        workers = psutil.Process(running.pid).children()
+        running.send_signal(how)
+    assert running.returncode == code
+    assert psutil.wait_procs(workers, timeout=30)[1] == []  # none is left behind
     before = len(trials_in(log.parent))
     done = study(*arguments, "--resume")
     assert done.returncode == 0, done.stderr
