@@ -13,6 +13,8 @@ from collections import namedtuple
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 
@@ -193,7 +195,8 @@ _DEGREES = (
     "mark_turn_angle",
     "search_turn",
 )
-_DERIVED = ("kickable_distance", "touch_distance")
+_DERIVED = ("kickable_distance", "touch_distance", "ball_roll", "player_roll")
+ROLL_CYCLES = 128  # entries of the two tables of rolling distances
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
 Constants = namedtuple(  # type: ignore[misc]
@@ -213,8 +216,17 @@ def pack(task: Task, config: Config) -> Constants:
     physics = config.physics
     touch = physics.player_size + physics.ball_size
     return Constants(
-        **values, touch_distance=touch, kickable_distance=touch + physics.kickable_margin
+        **values,
+        touch_distance=touch,
+        kickable_distance=touch + physics.kickable_margin,
+        ball_roll=_roll_table(physics.ball_decay),
+        player_roll=_roll_table(physics.player_decay),
     )
+
+
+def _roll_table(decay: float) -> np.ndarray:
+    """(ROLL_CYCLES,) distance over first speed of what rolls for 0, 1, .. cycles."""
+    return (1.0 - decay ** np.arange(ROLL_CYCLES)) / (1.0 - decay)
 
 
 def _check_numbers(group: object) -> None:

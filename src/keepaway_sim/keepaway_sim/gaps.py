@@ -11,6 +11,7 @@ import struct
 from dataclasses import dataclass, field
 
 from keepaway_sim.messages import ACTION_REQUEST, CYCLE_NS, FIELD_STATE, PERCEPTION
+from keepaway_sim.recording import BagReader
 
 _PERCEPTION = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome, decision due
 _FIELD_STATE = struct.Struct("<4xiIII")  # stamp, episode, cycle
@@ -122,3 +123,11 @@ class GapCounter:
         if len(keys) > _FORGET_AFTER:
             oldest = next(iter(keys))
             self.unanswered[player] = self.unanswered.get(player, 0) + keys.pop(oldest)
+
+
+def count_gaps(reader: BagReader) -> GapCounter:
+    """What is missing in a bag."""
+    counter = GapCounter(selected=reader.info.get("episodes") == "selected")
+    for message in reader.messages():
+        counter.feed(message.topic, message.message_type, message.data)
+    return counter

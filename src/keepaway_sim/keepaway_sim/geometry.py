@@ -39,16 +39,6 @@ def quantize(value, step):
 
 
 @compiled
-def rolling(decay, cycles):
-    """Distance over first speed of what rolls for `cycles` with its speed decaying each cycle.
-
-    >>> round(rolling(0.94, 2), 12)
-    1.94
-    """
-    return (1.0 - decay**cycles) / (1.0 - decay)
-
-
-@compiled
 def cone_contains(x, y, start_x, start_y, end_x, end_y, width):
     """Is (x, y) in the cone from start to end that is `width` wide (half) at distance 1?
 

@@ -11,7 +11,7 @@ import math
 
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import clip, length, rolling, wrap
+from keepaway_sim.geometry import clip, length, wrap
 from keepaway_sim.physics import limited
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
@@ -28,7 +28,7 @@ def dash_power(c, along, speed_along, cycles):
     """Power of the dash that covers `along` metres ahead in `cycles` (P: getPowerForDash)."""
     wanted = c.player_speed_max
     if along * (1.0 - c.player_decay) < c.player_speed_max:  # else too far for any `cycles`
-        wanted = min(along / rolling(c.player_decay, cycles), wanted)
+        wanted = min(along / c.player_roll[cycles], wanted)
     return clip((wanted - speed_along) / c.dash_power_rate, -100.0, 100.0)
 
 
@@ -50,7 +50,7 @@ def turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
         ux, uy: unit vector of its body direction.
         to_x, to_y, cycles: the point, and the time there is to reach it.
     """
-    roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
+    roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
     away = length(to_x - x, to_y - y)
     ratio = 3.0 if away > 20.0 else (2.0 if away > 10.0 else 0.9)
@@ -128,12 +128,12 @@ def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old)
     first, first_x, first_y = NEVER, 0.0, 0.0
     kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
     speed = length(ball_v[0], ball_v[1])
-    i = _straight_run(c, x, y, vx, vy, ball, ball_v) if not has_old else 0
+    i = _straight_run(c, x, y, vx, vy, ball, ball_v)
     while i <= c.intercept_horizon:
-        roll = rolling(c.ball_decay, i)
+        roll = c.ball_roll[i]
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
         off = length(bx - old_x, by - old_y) if has_old else math.inf
-        moving = speed * c.ball_decay**i > MOVING_BALL
+        moving = speed * (1.0 - (1.0 - c.ball_decay) * roll) > MOVING_BALL
         candidate = moving and off < kept_off
         skip = 1
         if first == NEVER or candidate:
@@ -142,7 +142,7 @@ def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old)
                 first, first_x, first_y = i, bx, by
             if candidate and left < SAFE_SHARE * c.kickable_distance:
                 kept, kept_x, kept_y, kept_off = i, bx, by, off
-            if first == NEVER and not has_old:
+            if first == NEVER:
                 skip = max(int((left - c.kickable_distance) / (1.0 + speed)), 1)
         if first != NEVER and (not has_old or not moving or i >= first + KEEP_HORIZON):
             break
@@ -151,14 +151,14 @@ def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old)
         return kept, kept_x, kept_y
     if first != NEVER:
         return first, first_x, first_y
-    roll = rolling(c.ball_decay, BEYOND)
+    roll = c.ball_roll[BEYOND]
     return BEYOND, ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
 
 
 @compiled
 def _left_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
     """`reach_after`, but only a lower bound where the point is out of question."""
-    roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
+    roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     rest = length(to_x - x - roll * vx, to_y - y - roll * vy)
     if rest / c.player_speed_max > cycles + c.kickable_distance:
         return rest - cycles * c.player_speed_max
@@ -216,7 +216,7 @@ def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
         return cycles_to_point(c, x, y, vx, vy, ux, uy, ball[0], ball[1])
     i = _straight_run(c, x, y, vx, vy, ball, ball_v)
     while i < 2 * c.intercept_horizon:
-        roll = rolling(c.ball_decay, i)
+        roll = c.ball_roll[i]
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
         needed = cycles_to_point(c, x, y, vx, vy, ux, uy, bx, by)
         if needed <= i:
@@ -233,12 +233,14 @@ def _straight_run(c, x, y, vx, vy, ball, ball_v):
     speed a cycle, so several may be skipped at once.
     """
     speed, own = length(ball_v[0], ball_v[1]), length(vx, vy)
+    top = min(100.0 * c.dash_power_rate / (1.0 - c.player_decay), c.player_speed_max)
+    head_start = c.kickable_distance + own / (1.0 - c.player_decay)
     i = 0
     while i < 2 * c.intercept_horizon:
-        roll = rolling(c.ball_decay, i)
+        roll = c.ball_roll[i]
         rel_x, rel_y = ball[0] + roll * ball_v[0] - x, ball[1] + roll * ball_v[1] - y
-        gap = run_cycles(c, length(rel_x, rel_y) - 2.0 * own, own) - i
-        if gap <= 0:
+        gap = (length(rel_x, rel_y) - head_start) / top - i
+        if gap <= 0.0:
             return i
         i += max(int(gap / (1.0 + speed)), 1)
     return i

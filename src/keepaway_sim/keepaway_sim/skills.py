@@ -15,7 +15,7 @@ import math
 
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import TWO_PI, clip, cone_contains, length, rolling, wrap
+from keepaway_sim.geometry import TWO_PI, clip, cone_contains, length, wrap
 from keepaway_sim.intercept import (
     LOOK_AHEAD,
     dash_power,
@@ -108,7 +108,7 @@ def turn_body_to(c, s, f, p, x, y, cycles):
     """Turn toward a point as seen from where the player will have rolled after `cycles`."""
     px, py = s.position[f, p, p]
     vx, vy = s.velocity[f, p, p]
-    roll = rolling(c.player_decay, cycles)
+    roll = c.player_roll[cycles]
     angle = wrap(math.atan2(y - py - roll * vy, x - px - roll * vx) - s.body[f, p, p])
     return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
 
@@ -399,7 +399,7 @@ def pass_origin(c, s, f, p):
     soonest = NEVER
     for j in range(c.num_keepers + c.num_takers):
         soonest = min(soonest, s.cycles_to_ball[f, p, j])
-    roll = rolling(c.ball_decay, soonest) if soonest < NEVER else 0.0
+    roll = c.ball_roll[soonest] if soonest < NEVER else 0.0
     x, y = s.position[f, p, ball]
     vx, vy = s.velocity[f, p, ball]
     return x + roll * vx, y + roll * vy
@@ -507,7 +507,7 @@ def intercept(c, s, m, f, p):
         close = meet_closely(c, s, f, p)
         if close[0] != NONE:
             return close
-    roll = rolling(c.player_decay, min(cycles, LOOK_AHEAD))
+    roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
         return turn_body_along(c, s, f, p, direction_of_play(c, p))
     angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
@@ -542,7 +542,7 @@ def meet_closely(c, s, f, p):
         angle = wrap(forward - reached)
         reached += turn_moment(c, angle, speed) / (1.0 + c.inertia_moment * speed)
         speed *= c.player_decay
-        roll, ball_roll = rolling(c.player_decay, cycles), rolling(c.ball_decay, cycles)
+        roll, ball_roll = c.player_roll[cycles], c.ball_roll[cycles]
         away = length(px + roll * vx - bx - ball_roll * ux, py + roll * vy - by - ball_roll * uy)
         if away < within:
             turn_helps = True
@@ -552,7 +552,7 @@ def meet_closely(c, s, f, p):
         kind, stop, _ = dash_to(c, s, f, p, px, py, 1)
         sx = px + vx + c.dash_power_rate * stop * math.cos(yaw)
         sy = py + vy + c.dash_power_rate * stop * math.sin(yaw)
-        ball_roll = rolling(c.ball_decay, 2)
+        ball_roll = c.ball_roll[2]
         if length(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
             return kind, stop, 0.0
     if turn_helps:
