@@ -32,7 +32,7 @@ from keepaway_transfer.study import Study, load_study
 
 log = logging.getLogger("study")
 
-BAR = "{percentage:3.0f}% {bar} {postfix}"
+BAR = "{percentage:3.0f}% {bar} {desc}"
 
 
 def main() -> int:
@@ -67,13 +67,14 @@ def _run(study: Study, arguments: argparse.Namespace) -> None:
         try:
             for trial in run(study, results, executor, play, arguments.batch):
                 progress.add(trial)
+                bar.set_description_str(str(progress), refresh=False)
                 bar.update()
-                bar.set_postfix_str(str(progress))
                 if bar.disable:  # the output is no terminal
                     log.info("%s", progress)
         except KeyboardInterrupt:
             print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
             os._exit(130)  # without waiting for batches: what is done is on the disk
+        bar.close()
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
 
 
