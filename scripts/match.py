@@ -85,23 +85,43 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
     own = {"task", "field", "seed", "speed", "episodes", "profile", "visible_angle", "record"}
     settings = {name: value for name, value in vars(args).items() if name in own}
-    settings["record_info"] = json.dumps({"command": shlex.join(sys.argv)})
+    players = {
+        name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
+    }
+    agents = {name: {"policy": player["policy"]} for name, player in players.items()}
+    info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents)}
+    settings["record_info"] = json.dumps(info)
+    settings["record_attachments"] = json.dumps(weights_at_start(players))
     return [
         Member("simulator", "simulator", arguments_of("simulator", args, settings)),
-        *(member(args, name, task.role(p)) for p, name in enumerate(task.player_names)),
+        *(
+            Member(name, task.role(p).name.lower(), arguments_of(name, args, players[name]))
+            for p, name in enumerate(task.player_names)
+        ),
     ]
 
 
-def member(args: argparse.Namespace, name: str, role: TaskRole) -> Member:
-    """A player's node."""
-    program = role.name.lower()
-    policy = getattr(args, f"{program}_policy")
+def player_settings(args: argparse.Namespace, name: str, role: TaskRole) -> dict[str, object]:
+    """The parameters of a player's node."""
+    policy = getattr(args, f"{role.name.lower()}_policy")
     settings: dict[str, object] = {"policy": policy, "resume": args.resume}
     if policy in ("learn", "greedy") and args.load_weights:
         settings["load_weights"] = str(args.load_weights.absolute() / f"{name}.npz")
     if policy == "learn" and args.save_weights:
         settings["save_weights"] = str(args.save_weights.absolute() / f"{name}.npz")
-    return Member(name, program, arguments_of(name, args, settings))
+    return settings
+
+
+def weights_at_start(players: dict[str, dict[str, object]]) -> dict[str, str]:
+    """The weights files that players begin with; a bag gets copies of them."""
+    files = {}
+    for name, settings in players.items():
+        own = Path(str(settings.get("save_weights", "")))
+        resumes = settings["resume"] and own.is_file()
+        start = own if resumes else settings.get("load_weights")
+        if start:
+            files[f"{name}.npz"] = str(start)
+    return files
 
 
 def arguments_of(name: str, args: argparse.Namespace, settings: dict[str, object]) -> list[str]:

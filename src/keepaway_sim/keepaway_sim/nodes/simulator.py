@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.duration import Duration
@@ -50,6 +51,7 @@ MARKER_PERIOD = 0.1  # [s] viewers are not sent more
 HEALTH_PERIOD = 1.0  # [s]
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
+RECORDER_LAG = 50  # [cycles] that a recorder may be behind
 FIXED = ParameterDescriptor(read_only=True)
 ANY_TYPE = ParameterDescriptor(read_only=True, dynamic_typing=True)
 
@@ -74,6 +76,8 @@ class Settings:
     autostart: bool = True  # kick off when all players are there
     record: str = ""  # folder of a bag to write; empty: none
     record_info: str = "{}"  # JSON object of texts, written into the bag
+    record_attachments: str = "{}"  # JSON object, name -> file to put into the bag
+    wait_for_recorder: bool = False  # play no faster than a recorder's node follows
 
     def __post_init__(self) -> None:
         for name in ("seed", "episodes", "speed"):
@@ -118,6 +122,7 @@ class Simulator(Node):
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
+        self._recorded: int | None = None  # [ns] what a recorder's node has reached
         self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
         self._health_at, self._health_cycles = time.monotonic(), 0
         self._time_played = 0.0  # [s]
@@ -137,6 +142,7 @@ class Simulator(Node):
                 spin(RESEND_PERIOD)
                 continue
             began = time.monotonic()
+            self._let_recorder_follow()
             self._send()
             if not self._is_over():
                 self._collect()
@@ -166,7 +172,10 @@ class Simulator(Node):
         if not self.settings.record:
             return None
         info = world_info(self.world, self.settings.seed, **json.loads(self.settings.record_info))
-        return BagWriter(Path(self.settings.record), info)
+        bag = BagWriter(Path(self.settings.record), info)
+        for name, path in json.loads(self.settings.record_attachments).items():
+            bag.attach(name, Path(path).read_bytes())
+        return bag
 
     def _listen(self) -> None:
         for player, seat in enumerate(self.roster.seats):
@@ -182,6 +191,7 @@ class Simulator(Node):
             ("reset", self._on_reset),
         ):
             self.create_service(Trigger, name, serve)
+        self.create_subscription(Time, "recorded", self._on_recorded, LATCHED)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
         self.create_timer(HEALTH_PERIOD, self._say_health)
@@ -211,6 +221,9 @@ class Simulator(Node):
         if not self.roster.seats[player].present:
             self.roster.welcome(player)
             self.get_logger().info(f"{name} is ready: {status['policy']}")
+
+    def _on_recorded(self, time_: Time) -> None:
+        self._recorded = time_.sec * messages.SECOND + time_.nanosec
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         given = {p.name: p.value for p in parameters if p.name in CHANGEABLE}
@@ -256,8 +269,24 @@ class Simulator(Node):
     def _missing(self) -> str:
         """Names of those without whom it cannot go on: at first everybody, later anybody."""
         if not self._first_counts:
-            return ", ".join(self.roster.absent)
+            waits = self.settings.wait_for_recorder and self._recorded is None
+            return ", ".join([*self.roster.absent, *["a recorder"] * waits])
         return "any player" if self.roster.is_deserted else ""
+
+    def _let_recorder_follow(self) -> None:
+        """Wait for a recorder that has fallen far behind; for one that stays there, no longer."""
+        until = time.monotonic() + self.settings.answer_timeout
+        while self._recorder_lag() > RECORDER_LAG and not self._is_over():
+            self._spin(RESEND_PERIOD)
+            if time.monotonic() > until:
+                self.get_logger().error("the recorder is missing: the match goes on without it")
+                self._recorded = None
+
+    def _recorder_lag(self) -> int:
+        """How far the recorder is behind [cycles]; 0 if nobody waits for it."""
+        if not self.settings.wait_for_recorder or self._recorded is None:
+            return 0
+        return (self._messages.stamp_ns() - self._recorded) // messages.CYCLE_NS
 
     def _send(self) -> None:
         """Tell everybody about this moment."""
@@ -348,11 +377,11 @@ class Simulator(Node):
         if not self._first_counts or not self.context.ok():
             return
         until = time.monotonic() + FAREWELL
-        while time.monotonic() < until and not self._is_taken_in():
+        while time.monotonic() < until and (not self._is_taken_in() or self._recorder_lag()):
             self._spin(RESEND_PERIOD)
         self._note_statuses()
         self._say_health()
-        self._voice.wait_until_heard(FAREWELL)
+        self._voice.wait_until_heard("episode", FAREWELL)
         self._health.wait_for_all_acked(Duration(seconds=FAREWELL))
 
     def _is_taken_in(self) -> bool:

@@ -15,7 +15,8 @@ from keepaway_msgs.msg import Episode, FieldState, Match, Perception
 from keepaway_sim import messages
 from keepaway_sim.recording import BagWriter
 
-QUEUE = QoSProfile(depth=10)
+QUEUE = QoSProfile(depth=200)
+"""Deeper than a player needs: a recorder may be some cycles behind."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ALL = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Whoever counts episodes may come late."""
@@ -61,10 +62,9 @@ class Voice:
         """Does anybody listen?"""
         return bool(self._publishers[topic].get_subscription_count())
 
-    def wait_until_heard(self, patience: float) -> None:
-        """Wait until what was said has arrived everywhere, at most so many seconds a topic."""
-        for publisher in self._publishers.values():
-            publisher.wait_for_all_acked(Duration(seconds=patience))
+    def wait_until_heard(self, topic: str, patience: float) -> None:
+        """Wait until what was said on a topic has arrived everywhere, at most so many seconds."""
+        self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
 
     def note(self, topic: str, message_type: str, data: bytes, time: int) -> None:
         """Record what somebody else said, if a bag is written; `topic` is its name in full."""
