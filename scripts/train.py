@@ -81,7 +81,7 @@ def train(
     Returns:
         Cycles a second once it runs, or None if nothing was played.
     """
-    meter = Meter(len(numbers))
+    meter, played = Meter(len(numbers)), Progress()
     total = len(numbers) * training.episodes
     with tqdm(total=total, disable=None, unit=" episodes", smoothing=0.05) as bar:
 
@@ -95,9 +95,11 @@ def train(
                 if folder:
                     folder.save(result)
                 episodes[result.trial.label] = result.durations, result.outcomes
+                played.cycles += int(result.durations.sum())
+            meter.read(played)
         except KeyboardInterrupt:
             pass
-    return meter.rate
+    return meter.rate if numbers else None
 
 
 class Meter:
@@ -105,16 +107,21 @@ class Meter:
 
     def __init__(self, trials: int) -> None:
         self.trials = trials
-        self.rate: float | None = None  # [cycles/s]
         self._progress = Progress()
-        self._first: tuple[float, int] | None = None  # when it ran, and cycles by then
+        self._readings = [(time.perf_counter(), 0)]  # time and cycles: start, first, last
 
     def read(self, progress: Progress) -> None:
-        """Take a reading; compiling and starting, before the first one, do not count."""
-        now, self._progress = time.perf_counter(), progress
-        begun, cycles = self._first = self._first or (now, progress.cycles)
-        if progress.cycles > cycles:
-            self.rate = (progress.cycles - cycles) / (now - begun)
+        """Take a reading."""
+        self._progress = progress
+        self._readings = [*self._readings[:2], (time.perf_counter(), progress.cycles)]
+
+    @property
+    def rate(self) -> float | None:
+        """Cycles a second since the first reading, so that compiling and starting do not count."""
+        if len(self._readings) < 2:
+            return None
+        (begun, before), (now, cycles) = self._readings[-2:]
+        return (cycles - before) / (now - begun)
 
     def __str__(self) -> str:
         done = self._progress
@@ -130,7 +137,7 @@ def report(
 ) -> None:
     """Print how the episodes went."""
     scores = [
-        Score(float(cycles) * CYCLE_TIME, Outcome(outcome))
+        Score(int(cycles), float(cycles) * CYCLE_TIME, Outcome(outcome))
         for durations, outcomes in episodes.values()
         for cycles, outcome in zip(durations, outcomes, strict=True)
     ]
