@@ -6,7 +6,6 @@ import math
 
 from keepaway_sim.compiled import compiled
 
-
 TWO_PI = 2.0 * math.pi
 
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 
-
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import clip, length, wrap
+from keepaway_sim.geometry import clip, length
 from keepaway_sim.physics import limited
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
@@ -39,16 +38,19 @@ def turn_moment(c, angle, speed):
 
 
 @compiled
-def turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
-    """Angle by which a player wants to turn before it runs to a point; 0.0 if it need not.
+def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
+    """Does a player turn before it runs to a point, and where does it face a cycle later?
 
     A player turns while the point lies off the line of its body, or behind it and further than
-    `back_distance` (P: predictCommandTurnTowards).
+    `back_distance`; near points may also be reached backwards (P: predictCommandTurnTowards).
 
     Args:
         x, y, vx, vy: the player's position [m] and velocity [m/cycle].
         ux, uy: unit vector of its body direction.
         to_x, to_y, cycles: the point, and the time there is to reach it.
+
+    Returns:
+        whether it turns, and the unit vector of its body after one cycle of it.
     """
     roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
@@ -56,37 +58,37 @@ def turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
     ratio = 3.0 if away > 20.0 else (2.0 if away > 10.0 else 0.9)
     allowed = ratio * c.kickable_distance
     rest = length(rel_x, rel_y)
-    along, across = ux * rel_x + uy * rel_y, ux * rel_y - uy * rel_x
-    if not _off(along, across, rest, allowed, back_distance):
-        return 0.0
-    angle = math.atan2(across, along)
-    if cycles < 4 and rest < back_distance:
-        back = wrap(angle + math.pi)
-        left = angle - _achieved(c, angle, vx, vy)
-        if _off(rest * math.cos(left), rest * math.sin(left), rest, allowed, back_distance):
-            left = angle - _achieved(c, back, vx, vy)
-            if abs(rest * math.sin(left)) < 0.9 * c.kickable_distance:
-                return back
-    return angle
-
-
-@compiled
-def _off(along, across, rest, allowed, back_distance):
-    return abs(across) > allowed or (along < 0.0 and rest > back_distance)
-
-
-@compiled
-def _achieved(c, angle, vx, vy):
-    """How far of `angle` a moving player turns in one cycle."""
+    if not _off(ux, uy, rel_x, rel_y, rest, allowed, back_distance):
+        return False, ux, uy
+    rel_x, rel_y = rel_x / rest, rel_y / rest
     most = math.pi / (1.0 + c.inertia_moment * length(vx, vy))
-    return clip(angle, -most, most)
+    ahead_x, ahead_y = _turned(ux, uy, rel_x, rel_y, most)
+    if cycles < 4 and rest < back_distance:
+        if _off(ahead_x, ahead_y, rest * rel_x, rest * rel_y, rest, allowed, back_distance):
+            back_x, back_y = _turned(ux, uy, -rel_x, -rel_y, most)
+            if rest * abs(back_x * rel_y - back_y * rel_x) < 0.9 * c.kickable_distance:
+                return True, back_x, back_y
+    return True, ahead_x, ahead_y
 
 
 @compiled
-def _turned(c, ux, uy, angle, vx, vy):
-    """The body's unit vector after a cycle of turning toward `angle`."""
-    turn = _achieved(c, angle, vx, vy)
-    cosine, sine = math.cos(turn), math.sin(turn)
+def _off(ux, uy, rel_x, rel_y, rest, allowed, back_distance):
+    """Does a point lie too far off the line of a body, or too far behind it?"""
+    behind = ux * rel_x + uy * rel_y < 0.0
+    return abs(ux * rel_y - uy * rel_x) > allowed or (behind and rest > back_distance)
+
+
+@compiled
+def _turned(ux, uy, to_x, to_y, most):
+    """The unit vector u turned toward the unit vector `to`, but by no more than `most` [rad]."""
+    if most > 3.0:  # a player at rest turns anywhere
+        return to_x, to_y
+    cosine = math.cos(most)
+    if ux * to_x + uy * to_y >= cosine:
+        return to_x, to_y
+    sine = math.sqrt(1.0 - cosine * cosine)
+    if ux * to_y - uy * to_x < 0.0:
+        sine = -sine
     return cosine * ux - sine * uy, sine * ux + cosine * uy
 
 
@@ -97,10 +99,9 @@ def reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
     for k in range(cycles):
         left = cycles - k
         if turning:
-            angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, left, c.back_dash_distance)
-            turning = angle != 0.0
-            if turning:
-                ux, uy = _turned(c, ux, uy, angle, vx, vy)
+            turning, ux, uy = heading_to_go(
+                c, x, y, vx, vy, ux, uy, to_x, to_y, left, c.back_dash_distance
+            )
         if not turning:
             along = ux * (to_x - x) + uy * (to_y - y)
             power = dash_power(c, along, ux * vx + uy * vy, left)
@@ -194,10 +195,9 @@ def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
     for _ in range(5):
         if length(to_x - x, to_y - y) < c.kickable_distance:
             return cycles
-        angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)
-        if angle == 0.0:
+        turns, ux, uy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)
+        if not turns:
             break
-        ux, uy = _turned(c, ux, uy, angle, vx, vy)
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
         cycles += 1

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-
 from keepaway_sim.compiled import compiled
 from keepaway_sim.geometry import length
 from keepaway_sim.physics import on_grid

@@ -12,16 +12,15 @@ from __future__ import annotations
 
 import math
 
-
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER
 from keepaway_sim.geometry import TWO_PI, clip, cone_contains, length, wrap
 from keepaway_sim.intercept import (
     LOOK_AHEAD,
     dash_power,
+    heading_to_go,
     meeting_cycles,
     turn_moment,
-    turn_to_go,
 )
 from keepaway_sim.physics import kick_acceleration, kick_rate, limited
 from keepaway_sim.task import Action
@@ -510,8 +509,9 @@ def intercept(c, s, m, f, p):
     roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
         return turn_body_along(c, s, f, p, direction_of_play(c, p))
-    angle = turn_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
-    if angle != 0.0:
+    turns, wx, wy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
+    if turns:
+        angle = math.atan2(ux * wy - uy * wx, ux * wx + uy * wy)
         return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
     return dash_to(c, s, f, p, to_x, to_y, max(cycles, 1))
 

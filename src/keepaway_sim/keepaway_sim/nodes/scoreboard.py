@@ -20,11 +20,16 @@ RECENT = 20
 """Episodes of the mean that is shown."""
 
 
+def score(episode: Episode) -> Score:
+    """What counts of an episode."""
+    return Score(episode.duration, Outcome(episode.outcome))
+
+
 class Scoreboard(Node):
     """Listens to `episode` and `diagnostics` of one match.
 
     Attributes:
-        scores: of the episodes by number.
+        episodes: that have ended, by number.
         state: of the match, in the simulator's words.
         figures: the simulator's, by name.
         troubles: by player, how many answers were late, missed and rejected.
@@ -33,7 +38,7 @@ class Scoreboard(Node):
     def __init__(self, num_wanted: int = 0, out: TextIO = sys.stderr, **node_options: Any) -> None:
         """Nothing heard yet; `num_wanted` is how many episodes are to be played, 0 if unknown."""
         super().__init__("scoreboard", **node_options)
-        self.scores: dict[int, Score] = {}
+        self.episodes: dict[int, Episode] = {}
         self.state = "no simulator was heard"
         self.figures: dict[str, str] = {}
         self.troubles: dict[str, dict[str, int]] = {}
@@ -45,23 +50,24 @@ class Scoreboard(Node):
     @property
     def has_begun(self) -> bool:
         """Has there been a kick-off?"""
-        return bool(self.scores) or self.state == "plays"
+        return bool(self.episodes) or self.state == "plays"
 
     def summary(self) -> dict[str, Any]:
-        """The match in numbers."""
+        """The match in numbers, and every episode's cycles and outcome in order."""
+        episodes = [episode for _, episode in sorted(self.episodes.items())]
         rate = self.figures.get("mean_cycles_per_second")
         return {
-            **summary([score for _, score in sorted(self.scores.items())]),
+            **summary(list(map(score, episodes))),
             "cycles_per_second": float(rate) if rate else None,
-            "troubles": {
-                name: counts for name, counts in self.troubles.items() if any(counts.values())
-            },
+            "troubles": {name: each for name, each in self.troubles.items() if any(each.values())},
+            "episode_cycles": [episode.cycles for episode in episodes],
+            "episode_outcomes": [episode.outcome for episode in episodes],
         }
 
     def show(self) -> None:
         """Report, if it is time to."""
         now = time.monotonic()
-        if now < self._show_at or not self.scores:
+        if now < self._show_at or not self.episodes:
             return
         is_terminal = self._out.isatty()
         self._show_at = now + (TERMINAL_PERIOD if is_terminal else FILE_PERIOD)
@@ -76,17 +82,19 @@ class Scoreboard(Node):
             self._out.write("\n")
 
     def _line(self) -> str:
-        recent = summary([self.scores[number] for number in sorted(self.scores)[-RECENT:]])
+        recent = summary(
+            [score(self.episodes[number]) for number in sorted(self.episodes)[-RECENT:]]
+        )
         mean = recent["mean_duration_s"]
         of = f"/{self._num_wanted}" if self._num_wanted else ""
         held = f", last {recent['episodes']} held {mean:.2f} s" if mean is not None else ""
         return (
-            f"{len(self.scores)}{of} episodes{held},"
+            f"{len(self.episodes)}{of} episodes{held},"
             f" {self.figures.get('cycles_per_second', '?')} cycles/s, {self.state}"
         )
 
     def _on_episode(self, message: Episode) -> None:
-        self.scores[message.number] = Score(message.duration, Outcome(message.outcome))
+        self.episodes[message.number] = message
 
     def _on_health(self, message: DiagnosticArray) -> None:
         prefix = self.get_namespace().rstrip("/") + "/"

@@ -260,7 +260,9 @@ class Simulator(Node):
             return False
         missing = self._missing()
         if missing:
-            self.get_logger().warning(f"waits for {missing}", throttle_duration_sec=LOG_PERIOD)
+            self.get_logger().warning(
+                f"waits for {missing}", throttle_duration_sec=LOG_PERIOD, skip_first=True
+            )
         elif not self._first_counts:
             self._first_counts = {p: s["episodes"] for p, s in self._statuses.items()}
             self._note_statuses()
