@@ -62,7 +62,7 @@ def main() -> int:
         signal.signal(number, lambda signum, _: told.append(signum))
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
     executor = EventsExecutor()
     try:
         task = Task.parse(args.task, args.field)
@@ -106,7 +106,8 @@ def player_settings(args: argparse.Namespace, name: str, role: TaskRole) -> dict
     policy = getattr(args, f"{role.name.lower()}_policy")
     settings: dict[str, object] = {"policy": policy, "resume": args.resume}
     if policy in ("learn", "greedy") and args.load_weights:
-        settings["load_weights"] = str(args.load_weights.absolute() / f"{name}.npz")
+        given = args.load_weights.absolute()
+        settings["load_weights"] = str(given / f"{name}.npz" if given.is_dir() else given)
     if policy == "learn" and args.save_weights:
         settings["save_weights"] = str(args.save_weights.absolute() / f"{name}.npz")
     return settings
@@ -128,7 +129,12 @@ def arguments_of(name: str, args: argparse.Namespace, settings: dict[str, object
     """A node's name, namespace and parameters, as ROS arguments."""
     clock = {"/clock": f"{args.namespace}/clock"} if args.namespace else {}
     made = ros_arguments(settings, name, args.namespace, clock)
-    return [*made, "--log-level", "info" if args.verbose else "warn"]
+    return [*made, *log_level(args)[1:]]
+
+
+def log_level(args: argparse.Namespace) -> list[str]:
+    """What the nodes tell of themselves, as ROS arguments."""
+    return ["--ros-args", "--log-level", "info" if args.verbose else "warn"]
 
 
 def check_files(args: argparse.Namespace) -> None:
@@ -244,7 +250,7 @@ def parse() -> argparse.Namespace:
     add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
     add("--record", default="", metavar="DIR", help="write a bag of everything that is said")
     add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
-    add("--load-weights", type=Path, metavar="DIR", help="where learned players read NAME.npz")
+    add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")
     add("--resume", action="store_true", help="go on from the weights in --save-weights")
     add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
     add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")

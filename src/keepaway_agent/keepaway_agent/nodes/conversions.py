@@ -1,14 +1,28 @@
-"""Messages <-> what a player's functions take: only this module knows the messages' fields."""
+"""Messages <-> what a player's functions take: only this module knows the messages' fields.
 
-import array
+A perception comes, and an answer goes, every cycle: these two are read and written as the bytes
+that they are (CDR, little-endian), because making message objects of them takes longer than
+deciding. A test holds the layouts against ROS's own. An agent in another language, or one that is
+not in a hurry, uses the ordinary messages.
+"""
+
+import functools
+import math
+import struct
 
 import numpy as np
 
 from keepaway_agent.actions import Outcome
-from keepaway_agent.agent import Agent, Decision, MatchFacts, Perceived
+from keepaway_agent.agent import Decision, MatchFacts, Perceived
 from keepaway_agent.errors import AgentError
 from keepaway_agent.policies import View
-from keepaway_msgs.msg import ActionRequest, Match, Perception
+from keepaway_msgs.msg import Match
+
+HEADER = b"\x00\x01\x00\x00"
+"""CDR, little-endian; fields are aligned to their sizes, counted from its end."""
+_OUTCOMES = frozenset(Outcome)
+_MOST_PADDING = 3
+"""Bytes that may follow a message's last field."""
 
 
 def match_facts(message: Match) -> MatchFacts:
@@ -30,45 +44,64 @@ def match_facts(message: Match) -> MatchFacts:
     )
 
 
-def perceived(message: Perception, agent: Agent) -> Perceived:
-    """A perception, checked to be one that this agent can have.
+def read_perception(data: bytes, num_players: int, index: int) -> Perceived:
+    """A Perception's bytes, checked to be one that this player can have.
 
     Raises:
-        AgentError: somebody else's, one of another number of players, or not of finite numbers.
+        AgentError: of another player or number of players, not finite, or not a Perception.
     """
-    num = agent.facts.num_players
-    if message.player_index != agent.index:
-        raise AgentError(f"a perception of player {message.player_index}")
-    if len(message.positions) != 2 * (num + 1) or len(message.ages) != num + 1:
-        raise AgentError(
-            f"a perception of {len(message.positions)} coordinates and {len(message.ages)} ages,"
-            f" where {num} players and the ball have {2 * (num + 1)} and {num + 1}"
-        )
-    if len(message.cycles_to_ball) != num:
-        raise AgentError(f"cycles to the ball of {len(message.cycles_to_ball)} players, not {num}")
-    positions = np.frombuffer(message.positions)
-    if not np.isfinite(positions).all():
+    layout, objects = _perception_layout(num_players), num_players + 1
+    if not layout.size <= len(data) <= layout.size + _MOST_PADDING:
+        raise AgentError(f"{len(data)} bytes: a perception of {num_players} has {layout.size}")
+    (
+        header, _, _, player, episode, cycle, outcome, is_due, is_kickable, _, _, *arrays
+    ) = layout.unpack_from(data)  # fmt: skip
+    counts = arrays[0], arrays[2 * objects + 1], arrays[4 * objects + 2], arrays[-num_players - 1]
+    if header != HEADER or counts != (2 * objects, 2 * objects, objects, num_players):
+        raise AgentError(f"not the perception of one of {num_players} players")
+    if player != index or outcome not in _OUTCOMES:
+        raise AgentError(f"a perception of player {player} with outcome {outcome}")
+    positions = arrays[1 : 2 * objects + 1]
+    if not all(map(math.isfinite, positions)):
         raise AgentError(f"positions that are not finite: {positions}")
+    ages = arrays[4 * objects + 3 : 5 * objects + 3]
     view = View(
-        position=positions.reshape(num + 1, 2),
-        age=np.frombuffer(message.ages, np.uint16).astype(np.int32),
-        cycles_to_ball=np.frombuffer(message.cycles_to_ball, np.uint16).astype(np.int32),
-        ball_kickable=message.ball_kickable,
-        cycle=message.cycle,
+        position=np.array(positions).reshape(objects, 2),
+        age=np.array(ages, dtype=np.int32),
+        cycles_to_ball=np.array(arrays[-num_players:], dtype=np.int32),
+        ball_kickable=is_kickable,
+        cycle=cycle,
     )
-    if message.outcome not in _OUTCOMES:
-        raise AgentError(f"outcome={message.outcome}")
-    return Perceived(message.episode, message.outcome, message.decision_due, view)
+    return Perceived(episode, outcome, is_due, view)
 
 
-_OUTCOMES = frozenset(Outcome)
+def write_request(index: int, perceived: Perceived, decision: Decision) -> bytes:
+    """The ActionRequest with which a player answers what it perceived, as bytes."""
+    values = decision.values.tolist()
+    return _request_layout(len(values)).pack(
+        HEADER,
+        index,
+        perceived.episode,
+        perceived.view.cycle,
+        decision.action,
+        decision.target,
+        len(values),
+        *values,
+    )
 
 
-def write_request(request: ActionRequest, message: Perception, decision: Decision) -> None:
-    """Make `request`, used again and again because making one takes long, answer a perception."""
-    request.player_index = message.player_index
-    request.episode = message.episode
-    request.cycle = message.cycle
-    request.action = decision.action
-    request.target = decision.target
-    request.action_values = array.array("d", decision.values.tobytes())
+@functools.cache
+def _perception_layout(num_players: int) -> struct.Struct:
+    objects = num_players + 1
+    moment = "4s iI B3x II B??x"  # header, stamp, player, episode, cycle, outcome, due, kickable
+    angles = "dd"
+    vectors = f"I4x {2 * objects}d"
+    padding = "2x" if objects % 2 else ""
+    counts = f"I {objects}H {padding} I {num_players}H"
+    return struct.Struct(f"< {moment} {angles} {vectors} {vectors} {counts}")
+
+
+@functools.cache
+def _request_layout(num_values: int) -> struct.Struct:
+    values = f"4x {num_values}d" if num_values else ""
+    return struct.Struct(f"< 4s B3x II BB2x I {values}")

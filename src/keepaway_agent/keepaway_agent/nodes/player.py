@@ -74,13 +74,15 @@ class Player(Node):
         self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
         self._start_weights = self._weights_to_start_from(files)
         name = self.get_name()
-        self._request = ActionRequest()
         self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", QUEUE)
         self._status = self.create_publisher(AgentStatus, f"{name}/status", LATCHED)
         self.create_subscription(Match, "match", self._on_match, LATCHED)
-        self.create_subscription(Perception, f"{name}/perception", self._on_perception, QUEUE)
+        self.create_subscription(
+            Perception, f"{name}/perception", self._on_perception, QUEUE, raw=True
+        )
         self.create_service(SaveWeights, f"{name}/save_weights", self._on_save)
         self.create_service(LoadWeights, f"{name}/load_weights", self._on_load)
+        self._is_announcing = True
         self._announcement = self.create_timer(ANNOUNCEMENT_PERIOD, self._announce)
 
     def save(self) -> None:
@@ -148,23 +150,24 @@ class Player(Node):
             )
         )
 
-    def _on_perception(self, message: Perception) -> None:
+    def _on_perception(self, data: bytes) -> None:
         agent = self.agent
         if agent is None:
             return
         try:
-            perceived = conversions.perceived(message, agent)
+            perceived = conversions.read_perception(data, agent.facts.num_players, agent.index)
         except AgentError as error:
             self.get_logger().warning(f"ignored: {error}", throttle_duration_sec=LOG_PERIOD)
             return
-        self._announcement.cancel()
         num_ended = agent.episodes + agent.cut_off
         decision = agent.perceive(perceived)
         if decision:
-            conversions.write_request(self._request, message, decision)
-            self._requests.publish(self._request)
+            self._requests.publish(conversions.write_request(agent.index, perceived, decision))
         if agent.episodes + agent.cut_off > num_ended:
-            self._after_episode(agent, message.outcome)
+            self._after_episode(agent, perceived.outcome)
+        if self._is_announcing:
+            self._is_announcing = False
+            self._announcement.cancel()
 
     def _after_episode(self, agent: Agent, outcome: int) -> None:
         if outcome == Outcome.IN_PLAY:

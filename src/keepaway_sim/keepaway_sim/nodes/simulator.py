@@ -316,9 +316,9 @@ class Simulator(Node):
         """When the cycle's time is over [s, monotonic]; never in lock-step."""
         if self.settings.speed == 0:
             return math.inf
-        duration = CYCLE_TIME / self.settings.speed
-        now = time.monotonic()
-        self._due = max(self._due + duration, now)  # lost time is not caught up with
+        duration, now = CYCLE_TIME / self.settings.speed, time.monotonic()
+        is_far_behind = self._due < now - duration  # then lost time is not caught up with
+        self._due = (now if is_far_behind else self._due) + duration
         return self._due
 
     def _is_collecting(self, until: float) -> bool:
