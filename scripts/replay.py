@@ -3,10 +3,12 @@
     .venv/bin/python scripts/replay.py out/bag
     .venv/bin/python scripts/replay.py out/bag --rate 4 --episodes 3-5 --loop true
     .venv/bin/python scripts/replay.py out/bag --topics match,keeper_1/perception
+    .venv/bin/python scripts/replay.py out/bag --check
 
 In a terminal the space bar pauses, the right arrow or . goes one cycle on, + and - change the
-rate, and q ends it. With the last line a keeper's node (scripts/keeper.py) answers what it would
-have done. What follows --ros-args goes to the node: -r __ns:=/again plays it in a namespace.
+rate, and q ends it. With the third line a keeper's node (scripts/keeper.py) answers what it would
+have done. --check plays nothing: the world and the players are made anew, and must do again what
+was recorded. What follows --ros-args goes to the node: -r __ns:=/again plays in a namespace.
 """
 
 import argparse
@@ -16,12 +18,17 @@ import termios
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 
+from keepaway_agent.checking import check_decisions
+from keepaway_agent.errors import AgentError
+from keepaway_sim.checking import check_world
+from keepaway_sim.episodes import MatchBag
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import SECOND
 from keepaway_sim.nodes.replayer import Replayer, Settings
@@ -30,7 +37,9 @@ from keepaway_sim.playback import Playback
 
 
 def main() -> int:
-    """Play it."""
+    """Play it, or check it."""
+    if "--check" in sys.argv:
+        return check(Path(parser().parse_args().path))
     rclpy.init(args=parse_node_arguments(parser(), sys.argv[1:]))
     executor = EventsExecutor()
     try:
@@ -53,6 +62,20 @@ def main() -> int:
     finally:
         rclpy.try_shutdown()
     return 0
+
+
+def check(path: Path) -> int:
+    """Say whether the recorded match replays."""
+    try:
+        bag = MatchBag(path)
+        world, players = check_world(bag), check_decisions(bag)
+    except (KeepawayError, AgentError) as error:
+        print(f"replay: {error}", file=sys.stderr)
+        return 1
+    for who, what, checked in (("the world", "cycles", world), ("players", "decisions", players)):
+        verdict = checked.difference or "the same, all of them"
+        print(f"{who}: {checked.episodes} episodes, {checked.compared} {what}: {verdict}")
+    return int(bool(world.difference or players.difference))
 
 
 @contextmanager
@@ -93,6 +116,9 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument("path", metavar="BAG", help="folder of the bag")
+    made.add_argument(
+        "--check", action="store_true", default=argparse.SUPPRESS, help="that it replays, no ROS"
+    )
     add_options(made, Settings, without=("path",))
     return made
 

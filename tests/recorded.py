@@ -1,11 +1,15 @@
 """Matches recorded for tests: a World played by a simple rule, into a bag."""
 
+import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from keepaway_sim.config import Config
+from keepaway_agent.agent import Agent, AgentConfig, MatchFacts, Perceived
+from keepaway_agent.policies import View
+from keepaway_sim.config import CYCLE_TIME, Config, profile
 from keepaway_sim.episodes import FieldRecorder, world_info
 from keepaway_sim.recording import BagWriter
 from keepaway_sim.task import Action, Outcome, Task
@@ -27,6 +31,57 @@ def record_match(path: Path, task: str, seed: int, episodes: int) -> Path:
             if world.perceptions.episode[0] < episodes:
                 recorder.moment()
     return path
+
+
+def record_agents(
+    path: Path, agents: dict[str, dict[str, Any]], seed: int, episodes: int, task: str = "3v2"
+) -> Path:
+    """Play and record a match of real players in this process; they see 90 degrees.
+
+    Args:
+        path: of the bag.
+        agents: player's name -> fields of AgentConfig.
+        seed, episodes, task: of the match.
+    """
+    world = World(Task.parse(task), profile(visible_angle=90.0))
+    world.start(0, np.random.SeedSequence(seed, spawn_key=(0, 0)))
+    teams = world.task.num_keepers, world.task.num_takers
+    facts = MatchFacts(*teams, world.task.field_length, world.task.field_width, CYCLE_TIME, seed)
+    players = [
+        Agent(facts, index, AgentConfig(**agents.get(name, {})))
+        for index, name in enumerate(world.task.player_names)
+    ]
+    with BagWriter(path, world_info(world, seed, agents=json.dumps(agents))) as bag:
+        recorder = FieldRecorder(bag, world, 0, seed)
+        recorder.moment()
+        while world.perceptions.episode[0] < episodes:
+            decisions = [
+                player.perceive(perceived(world.perceptions, index))
+                for index, player in enumerate(players)
+            ]
+            action = np.array([d.action if d else 0 for d in decisions])
+            target = np.array([d.target if d else 0 for d in decisions])
+            recorder.requests(action, target, [d.values.tolist() if d else () for d in decisions])
+            world.step(action[None], target[None])
+            if world.perceptions.episode[0] < episodes:
+                recorder.moment()
+    return path
+
+
+def perceived(seen: Perceptions, player: int) -> Perceived:
+    """What a player of field 0 perceives, as its agent wants it."""
+    return Perceived(
+        int(seen.episode[0]),
+        int(seen.outcome[0]),
+        bool(seen.decision_due[0, player]),
+        View(
+            seen.position[0, player],
+            seen.age[0, player],
+            seen.cycles_to_ball[0, player],
+            bool(seen.ball_kickable[0, player]),
+            int(seen.cycle[0]),
+        ),
+    )
 
 
 def simple_requests(

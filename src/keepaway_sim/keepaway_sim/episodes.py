@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim import messages
-from keepaway_sim.config import CYCLE_TIME, Config
+from keepaway_sim.config import CYCLE_TIME, NEVER, Config
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import (
     ACTION_REQUEST,
@@ -144,6 +144,9 @@ class Track(NamedTuple):
     target: np.ndarray  # (T, P)
     believed: np.ndarray  # (T, P, P + 1, 2) [m] where each player believes every object
     age: np.ndarray  # (T, P, P + 1) [cycles] how old that is
+    kickable: np.ndarray  # (T, P) bool: believes that it can kick the ball
+    due: np.ndarray  # (T, P) bool: has to decide
+    cycles_to_ball: np.ndarray  # (T, P, P) [cycles] of itself and its team-mates; NEVER
     requested: np.ndarray  # (T, P) what was asked for in answer to this cycle; -1: nothing
     requested_target: np.ndarray  # (T, P)
     values: np.ndarray  # (T, P, num_keepers) action values of learners
@@ -281,7 +284,10 @@ def _empty_track(state: np.ndarray, task: Task) -> Track:
         action=state["actions"].astype(np.int64),
         target=state["targets"].astype(np.int64),
         believed=np.full((count, num, num + 1, 2), np.nan),
-        age=np.full((count, num, num + 1), 65535, dtype=np.int64),
+        age=np.full((count, num, num + 1), NEVER, dtype=np.int64),
+        kickable=np.zeros((count, num), dtype=np.bool_),
+        due=np.zeros((count, num), dtype=np.bool_),
+        cycles_to_ball=np.full((count, num, num), NEVER, dtype=np.int64),
         requested=np.full((count, num), -1, dtype=np.int64),
         requested_target=np.full((count, num), -1, dtype=np.int64),
         values=np.full((count, num, task.num_keepers), np.nan),
@@ -295,6 +301,9 @@ def _add_perceptions(
     data, at = data[at >= 0], at[at >= 0]
     track.believed[at, player] = data["positions"].reshape(len(at), -1, 2)
     track.age[at, player] = data["ages"]
+    track.kickable[at, player] = data["ball_kickable"]
+    track.due[at, player] = data["decision_due"]
+    track.cycles_to_ball[at, player] = data["cycles_to_ball"]
 
 
 def _add_requests(
