@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import namedtuple
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -142,7 +143,7 @@ _V19 = Physics(
 PROFILES: dict[str, Physics] = {"2005": Physics(), "v19": _V19}
 
 
-def profile(name: str = "2005", *, visible_angle: float = 360.0, **changes: float) -> Config:
+def profile(name: str = "2005", *, visible_angle: float = 360.0, **changes: Any) -> Config:
     """The named configuration, with single constants changed by name.
 
     Args:
@@ -155,17 +156,27 @@ def profile(name: str = "2005", *, visible_angle: float = 360.0, **changes: floa
     """
     if name not in PROFILES:
         raise KeepawayError(f"profile={name!r}: choose from {', '.join(PROFILES)}")
-    physics, vision, skills = PROFILES[name], Vision(visible_angle=visible_angle), Skills()
+    config = Config(name, PROFILES[name], Vision(visible_angle=visible_angle), Skills())
+    return changed(config, changes)
+
+
+def changed(config: Config, changes: Mapping[str, Any]) -> Config:
+    """A configuration with single constants of physics, vision or skills changed by name.
+
+    Raises:
+        KeepawayError: an unknown name or a value that makes no sense.
+    """
+    groups: dict[str, Any] = {}
     for key, value in changes.items():
-        if hasattr(physics, key):
-            physics = dataclasses.replace(physics, **{key: value})
-        elif hasattr(vision, key):
-            vision = dataclasses.replace(vision, **{key: value})
-        elif hasattr(skills, key):
-            skills = dataclasses.replace(skills, **{key: value})
-        else:
+        owner = next((g for g in _GROUP_NAMES if hasattr(getattr(config, g), key)), None)
+        if owner is None:
             raise KeepawayError(f"{key!r} is no constant of physics, vision or skills")
-    return Config(name, physics, vision, skills)
+        group = groups.get(owner, getattr(config, owner))
+        groups[owner] = dataclasses.replace(group, **{key: value})
+    return dataclasses.replace(config, **groups)
+
+
+_GROUP_NAMES = ("physics", "vision", "skills")
 
 
 def noiseless(config: Config) -> Config:
@@ -199,29 +210,27 @@ _DERIVED = ("kickable_distance", "touch_distance", "ball_roll", "player_roll")
 ROLL_CYCLES = 128  # entries of the two tables of rolling distances
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
-Constants = namedtuple(  # type: ignore[misc]
+Constants: Any = namedtuple(  # type: ignore[misc]
     "Constants",
     [entry.name for group in _GROUPS for entry in dataclasses.fields(group)] + list(_DERIVED),
 )
 
 
-def pack(task: Task, config: Config) -> Constants:
+def pack(task: Task, config: Config) -> Any:
     """All constants as one named tuple that compiled functions take (angles in radians)."""
     values: dict[str, Any] = {}
     for group in (task, config.physics, config.vision, config.skills):
         for entry in dataclasses.fields(group):
-            values[entry.name] = type(entry.default)(getattr(group, entry.name))
+            kind: Any = type(entry.default)  # one type per name, so that code is compiled once
+            values[entry.name] = kind(getattr(group, entry.name))
     for name in _DEGREES:
         values[name] = math.radians(values[name])
     physics = config.physics
-    touch = physics.player_size + physics.ball_size
-    return Constants(
-        **values,
-        touch_distance=touch,
-        kickable_distance=touch + physics.kickable_margin,
-        ball_roll=_roll_table(physics.ball_decay),
-        player_roll=_roll_table(physics.player_decay),
-    )
+    values["touch_distance"] = physics.player_size + physics.ball_size
+    values["kickable_distance"] = values["touch_distance"] + physics.kickable_margin
+    values["ball_roll"] = _roll_table(physics.ball_decay)
+    values["player_roll"] = _roll_table(physics.player_decay)
+    return Constants(**values)
 
 
 def _roll_table(decay: float) -> np.ndarray:

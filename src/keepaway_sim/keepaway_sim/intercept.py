@@ -63,11 +63,11 @@ def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
     rel_x, rel_y = rel_x / rest, rel_y / rest
     most = math.pi / (1.0 + c.inertia_moment * length(vx, vy))
     ahead_x, ahead_y = _turned(ux, uy, rel_x, rel_y, most)
-    if cycles < 4 and rest < back_distance:
-        if _off(ahead_x, ahead_y, rest * rel_x, rest * rel_y, rest, allowed, back_distance):
-            back_x, back_y = _turned(ux, uy, -rel_x, -rel_y, most)
-            if rest * abs(back_x * rel_y - back_y * rel_x) < 0.9 * c.kickable_distance:
-                return True, back_x, back_y
+    near = cycles < 4 and rest < back_distance
+    if near and _off(ahead_x, ahead_y, rest * rel_x, rest * rel_y, rest, allowed, back_distance):
+        back_x, back_y = _turned(ux, uy, -rel_x, -rel_y, most)
+        if rest * abs(back_x * rel_y - back_y * rel_x) < 0.9 * c.kickable_distance:
+            return True, back_x, back_y
     return True, ahead_x, ahead_y
 
 

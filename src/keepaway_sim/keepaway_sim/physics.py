@@ -194,7 +194,7 @@ class Bodies:
         self._sorted_ids, self._field_of_sorted = ids[order], order // len(radius)
         self._input, self._output = pymunk.batch.Buffer(), pymunk.batch.Buffer()
         self._contacts = pymunk.batch.Buffer()
-        self._input.set_float_buf(memoryview(self.motion).cast("B"))
+        self._input.set_float_buf(self.motion.data.cast("B"))
 
     def _add(self, radius: float) -> pymunk.Body:
         body = pymunk.Body(1.0, 1.0)

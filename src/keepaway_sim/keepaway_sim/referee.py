@@ -52,7 +52,7 @@ def kick_off(c, position, velocity, uniforms, cursor, stream):
 
 @compiled
 def near_ball(c, position, first, last):
-    """The player of first..last-1 nearest to the ball among those within kicking distance, or -1."""
+    """The player of first..last-1 nearest to the ball and within kicking distance; -1 if none."""
     ball = len(position) - 1
     nearest, best = -1, c.kickable_distance
     for p in range(first, last):

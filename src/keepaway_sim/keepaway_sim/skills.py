@@ -312,7 +312,7 @@ def rank_of(c, s, f, p, keeper):
     away = length(x - own[0], y - own[1])
     rank = 0
     for j in range(c.num_keepers):
-        if j == p or j == keeper:
+        if j in (p, keeper):
             continue
         other = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
         if other < away or (other == away and j < keeper):

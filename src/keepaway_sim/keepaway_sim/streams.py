@@ -54,7 +54,7 @@ class RandomStreams:
             row, start = self.uniforms[stream], self.cursor[stream]
             left = len(row) - start
             row[:left] = row[start:].copy()
-            row[left:] = generator.random(start)
+            generator.random(out=row[left:])
             self.cursor[stream] = 0
 
 

@@ -1,4 +1,4 @@
-"""What is played: how many keepers and takers, on what field, and the numbers for actions and outcomes."""
+"""What is played: how many keepers and takers on what field; actions and outcomes by number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Process statistics of episodes: when the ball is reached, kicked and passed, and how fast all move.
+"""Process statistics of episodes: when the ball is reached, kicked and passed; how all move.
 
 They say *why* episodes last as long as they do. The same definitions serve true positions of the
 real soccer server and those of this world.
@@ -6,6 +6,7 @@ real soccer server and those of this world.
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ def _passes(away: np.ndarray, ball: np.ndarray) -> tuple[float, float, float]:
     """
     owner = np.where((away < REACH).any(axis=1), away.argmin(axis=1), -1)
     held = np.flatnonzero(owner >= 0)
-    changes = [(a, b) for a, b in zip(held[:-1], held[1:], strict=True) if owner[a] != owner[b]]
+    changes = [(a, b) for a, b in itertools.pairwise(held) if owner[a] != owner[b]]
     if not changes:
         return 0.0, float("nan"), float("nan")
     cycles = float(np.mean([b - a for a, b in changes]))

@@ -14,12 +14,12 @@ the distance at which numbers are readable are not confused with each other.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from keepaway_sim.compiled import compiled
-from keepaway_sim.config import NEVER, Constants
+from keepaway_sim.config import NEVER
 from keepaway_sim.geometry import TWO_PI, length, quantize, wrap
 from keepaway_sim.physics import dash_acceleration, kick_acceleration, limited
 from keepaway_sim.streams import draw
@@ -117,7 +117,7 @@ def make_speech(num_fields: int, num_players: int) -> Speech:
     )
 
 
-def make_memory(c: Constants, num_fields: int) -> Memory:
+def make_memory(c: Any, num_fields: int) -> Memory:
     """Memory of players before their first cycle."""
     num_players = c.num_keepers + c.num_takers
     share = np.linspace(-0.5, 0.5, OPEN_POINTS) * (1.0 - 2.0 * c.open_border)

@@ -189,7 +189,7 @@ def is_legal(c, player, action, target):
         return action == _GO or (action == _MARK and 0 <= target < c.num_keepers)
     if action == _PASS:
         return 0 <= target < c.num_keepers and target != player
-    return action == _HOLD or action == _OPEN or action == _GO
+    return action in (_HOLD, _OPEN, _GO)
 
 
 @compiled_apart
@@ -274,17 +274,17 @@ def _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor):
     m.turned[f, p] = skills.expected_turn(c, s, f, p, kind, angle)
     m.kicked[f, p] = False
     if c.hearing:
-        vision.speak(c, s, speech, m, f, p, kind == skills.KICK)
+        vision.speak(c, s, speech, m, f, p, kind == vision.KICK)
     yaw = state.yaw[f, p]
-    if kind == skills.DASH:
+    if kind == vision.DASH:
         ax, ay = physics.dash_acceleration(c, power, yaw)
         acceleration[p, 0] += ax
         acceleration[p, 1] += ay
-    elif kind == skills.TURN:
+    elif kind == vision.TURN:
         noise = 2.0 * draw(uniforms, cursor, f) - 1.0 if c.turn_noise else 0.0
         speed = length(state.velocity[f, p, 0], state.velocity[f, p, 1])
         state.yaw[f, p] = physics.turned_yaw(c, yaw, angle, speed, noise)
-    elif kind == skills.KICK:
+    elif kind == vision.KICK:
         _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor)
 
 
