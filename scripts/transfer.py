@@ -1,9 +1,10 @@
-"""Carry what a keeper learned to a larger task, or write a mapping down to change it.
+"""Carry what a keeper learned to a larger task; write a mapping down; start the transfer node.
 
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --out start.npz
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 5v4 --out start.npz
     .venv/bin/python scripts/transfer.py mapping 3v2 4v3 > mine.toml
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --mapping mine.toml --out b.npz
+    .venv/bin/python scripts/transfer.py node --ros-args -r __ns:=/match_2
 
 Several tasks are a chain: rho from each to the next.
 """
@@ -55,6 +56,13 @@ def _mapping(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _node(arguments: argparse.Namespace) -> int:
+    from keepaway_transfer.nodes import transfer  # the others do without ROS
+
+    transfer.main(arguments.ros)
+    return 0
+
+
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -74,6 +82,9 @@ def _parse() -> argparse.Namespace:
     mapping.add_argument("source", help="for example 3v2")
     mapping.add_argument("target", help="for example 4v3")
     mapping.set_defaults(run=_mapping)
+    node = commands.add_parser("node", help="a ROS 2 node that carries weights over when asked")
+    node.add_argument("ros", nargs=argparse.REMAINDER, help="--ros-args and what follows it")
+    node.set_defaults(run=_node)
     for command in (apply, mapping):
         command.add_argument("--variant", choices=sorted(VARIANTS), default="rho")
         command.add_argument("--seed", type=int, default=0, help="of the shuffled mapping")
