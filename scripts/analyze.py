@@ -1,16 +1,21 @@
-"""Tables and figures of a study's results, or the learning time in a soccer server's log.
+"""Tables and figures of a study's results, of a recorded match, or of a soccer server's log.
 
     .venv/bin/python scripts/analyze.py results/table2
     .venv/bin/python scripts/analyze.py results/table2 --threshold 8 --out results/table2-at-8
+    .venv/bin/python scripts/analyze.py out/bag
     .venv/bin/python scripts/analyze.py log.kwy --threshold 9
 
-The report is written beside the results if no other folder is named.
+The report is written beside the results if no other folder is named; a bag's to BAG/analysis. Of a
+bag it has a line for every episode (CSV and Parquet), hold times, passes, losses and actions.
 """
 
 import argparse
 import sys
 from pathlib import Path
 
+from keepaway_sim.analysis import analyse
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.recording import is_bag
 from keepaway_transfer import metrics
 from keepaway_transfer.errors import TransferError
 from keepaway_transfer.kwy import read_kwy
@@ -25,13 +30,22 @@ def main() -> int:
         if arguments.results.suffix == ".kwy":
             print(_log_line(arguments.results, arguments.threshold or 9.0, arguments.window))
             return 0
+        if is_bag(arguments.results):
+            return _analyse_bag(arguments.results, arguments.out)
         results = read_results(arguments.results)
         out = arguments.out or arguments.results
         print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
-    except (TransferError, FileNotFoundError) as error:
+    except (TransferError, KeepawayError, FileNotFoundError) as error:
         print(f"analyze: {error}", file=sys.stderr)
         return 1
     print(f"Written to {out}: trials.csv, table.md and four figures.")
+    return 0
+
+
+def _analyse_bag(bag: Path, out: Path | None) -> int:
+    out = out or (bag if bag.is_dir() else bag.parent) / "analysis"
+    print(analyse(bag, out))
+    print(f"Written to {out}: episodes.csv and .parquet, summary.json and four figures.")
     return 0
 
 
@@ -50,7 +64,9 @@ def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("results", type=Path, help="folder of scripts/study.py, or a .kwy log")
+    parser.add_argument(
+        "results", type=Path, help="folder of scripts/study.py, a bag, or a .kwy log"
+    )
     parser.add_argument("--threshold", type=float, help="mean duration [s]; default the study's")
     parser.add_argument("--window", type=int, default=metrics.WINDOW, help="episodes; for a log")
     parser.add_argument(

@@ -3,6 +3,7 @@
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import ACTION_REQUEST, action_request, read_request
 from keepaway_sim.recording import BagReader, BagWriter
 
-LEARNERS = {
+LEARNERS: dict[str, dict[str, Any]] = {
     "keeper_1": {"policy": "learn"},
     "keeper_2": {"policy": "learn", "epsilon": 0.3, "lambda_": 0.5},
     "keeper_3": {"policy": "random"},
@@ -31,7 +32,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record_agents(tmp_path_factory.mktemp("bags") / "agents", LEARNERS, 5, episodes=6)
 
 
-def copied(bag: Path, path: Path, agents: dict[str, dict[str, object]]) -> Path:
+def copied(bag: Path, path: Path, agents: dict[str, dict[str, Any]]) -> Path:
     """The same recording, of a match that is said to have been played by others."""
     reader = BagReader(bag)
     with BagWriter(path, {**reader.info, "agents": json.dumps(agents)}) as copy:

@@ -27,7 +27,7 @@ from keepaway_sim.messages import (
     FieldMessages,
     Request,
 )
-from keepaway_sim.recording import BagReader, BagWriter
+from keepaway_sim.recording import BagReader, BagWriter, Batch
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.version import code_version
 from keepaway_sim.world import World
@@ -127,6 +127,22 @@ class EpisodeSummary(NamedTuple):
     lost_by: int  # player index; -1 nobody
 
 
+def episode_summaries(batch: Batch) -> Iterator[EpisodeSummary]:
+    """The episodes that a batch of Episode messages tells of."""
+    for entry in batch.data:
+        end = int(entry["stamp.sec"]) * SECOND + int(entry["stamp.nanosec"])
+        cycles = int(entry["cycles"])
+        yield EpisodeSummary(
+            number=int(entry["number"]),
+            start=end - cycles * CYCLE_NS,
+            end=end,
+            cycles=cycles,
+            duration=float(entry["duration"]),
+            outcome=Outcome(int(entry["outcome"])),
+            lost_by=int(entry["lost_by"]),
+        )
+
+
 class Track(NamedTuple):
     """One episode cycle by cycle; T cycles, P players, objects are players and, last, the ball.
 
@@ -205,18 +221,7 @@ class MatchBag:
     def episodes(self) -> Iterator[EpisodeSummary]:
         """Every finished episode, in order."""
         for batch in self.reader.batches([self.topic("episode")]):
-            for entry in batch.data:
-                end = int(entry["stamp.sec"]) * SECOND + int(entry["stamp.nanosec"])
-                cycles = int(entry["cycles"])
-                yield EpisodeSummary(
-                    number=int(entry["number"]),
-                    start=end - cycles * CYCLE_NS,
-                    end=end,
-                    cycles=cycles,
-                    duration=float(entry["duration"]),
-                    outcome=Outcome(int(entry["outcome"])),
-                    lost_by=int(entry["lost_by"]),
-                )
+            yield from episode_summaries(batch)
 
     def unfinished(self) -> EpisodeSummary | None:
         """The episode that was being played when the recording ended, if there was one."""

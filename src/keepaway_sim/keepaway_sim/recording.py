@@ -324,6 +324,7 @@ class BagReader:
         self.info: dict[str, str] = {}
         self.topics: dict[str, Topic] = {}
         self.counts: dict[str, int] = {}
+        self._layouts: dict[tuple[str, int], tuple[dict[str, int], np.dtype[np.void]]] = {}
         self._files = [_File(file) for file in _mcap_files(self.path)]
         for file in self._files:
             self.info.update(file.info)
@@ -406,19 +407,30 @@ class BagReader:
 
     def _batches_of_run(self, topic: str, raw: np.ndarray, index: np.ndarray) -> Iterator[Batch]:
         """Messages of one size may still differ in where they have it: split until they do not."""
-        codec = self.codec(topic)
+        size = int(index[0, 3] - index[0, 2])
+        rows = raw[index[:, 2, None] + np.arange(size)]
         while len(index):
-            first, last = index[0, 2:]
-            lengths = codec.lengths(codec.decode(raw[first:last].tobytes()))
-            size = int(last - first)
-            dtype = codec.dtype(lengths, size)
-            data = raw[index[:, 2, None] + np.arange(size)].view(dtype)[:, 0]
+            lengths, dtype = self._layout(topic, rows[0])
+            data = rows.view(dtype)[:, 0]
             alike = np.ones(len(index), dtype=bool)
             for name, length in lengths.items():
                 alike &= data[f"{name}.length"] == length
             count = len(index) if alike.all() else int(np.argmin(alike))
             yield Batch(topic, index[:count, 1], data[:count])
-            index = index[count:]
+            index, rows = index[count:], rows[count:]
+
+    def _layout(self, topic: str, message: np.ndarray) -> tuple[dict[str, int], np.dtype[np.void]]:
+        """The lengths of a message's sequences and so its type; mostly as the last of its size."""
+        key = self.topics[topic].message_type, len(message)
+        if key in self._layouts:
+            lengths, dtype = self._layouts[key]
+            first = message.view(dtype)[0]
+            if all(first[f"{name}.length"] == length for name, length in lengths.items()):
+                return lengths, dtype
+        codec = self.codec(topic)
+        lengths = codec.lengths(codec.decode(message.tobytes()))
+        self._layouts[key] = lengths, codec.dtype(lengths, len(message))
+        return self._layouts[key]
 
 
 class _Chunk(NamedTuple):
@@ -522,6 +534,12 @@ class _File:
         elif opcode == Opcode.STATISTICS:
             counts = np.frombuffer(data[46:], np.dtype([("channel", "<u2"), ("count", "<u8")]))
             self._counts = dict(counts.tolist())
+
+
+def is_bag(path: Path | str) -> bool:
+    """Is it a bag's folder, or an MCAP file by itself?"""
+    path = Path(path)
+    return path.suffix == ".mcap" if path.is_file() else any(path.glob("*.mcap"))
 
 
 def repair(path: Path | str, output: Path | str) -> BagReader:
