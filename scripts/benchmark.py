@@ -228,11 +228,13 @@ def ping_pong(num_players: int, cycles: int) -> float:
     executor = EventsExecutor()
     executor.add_node(node)
     answered: set[int] = set()
+
+    def take(answer: ActionRequest) -> None:
+        answered.add(answer.player_index)
+
     pings = [node.create_publisher(Perception, f"bench_{p}/ping", 10) for p in range(num_players)]
     for p in range(num_players):
-        node.create_subscription(
-            ActionRequest, f"bench_{p}/pong", lambda a: answered.add(a.player_index), 10
-        )
+        node.create_subscription(ActionRequest, f"bench_{p}/pong", take, 10)
     message = perception(num_players)
     try:
         for cycle in range(-100, cycles):

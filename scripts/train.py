@@ -137,7 +137,7 @@ def report(
 ) -> None:
     """Print how the episodes went."""
     scores = [
-        Score(int(cycles), float(cycles) * CYCLE_TIME, Outcome(outcome))
+        Score(float(cycles) * CYCLE_TIME, Outcome(outcome))
         for durations, outcomes in episodes.values()
         for cycles, outcome in zip(durations, outcomes, strict=True)
     ]

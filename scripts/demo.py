@@ -1,0 +1,220 @@
+"""The main job, end to end: learn 3v2 on ROS nodes, transfer, play 4v3, see what it gives.
+
+    scripts/demo                            # set up first, then this
+    .venv/bin/python scripts/demo.py --out out/demo
+
+1. 3v2 keepers learn, each a ROS node of its own; the match is recorded.
+2. 3v2 keepers learn for longer, in one program without ROS.
+3. The transfer node carries a 3v2 keeper's weights to 4v3, by rho.
+4. 4v3 keepers play on from them, again each a ROS node.
+5. A small study: learning curves of 4v3 from scratch and after transfer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_agent.weights import load_weights, save_weights
+from keepaway_sim.task import Task
+from keepaway_sim.version import code_version
+from keepaway_transfer import metrics, plotting
+from keepaway_transfer.rho import Transfer, transferred
+from keepaway_transfer.statistics import mean_curve
+
+SCRIPTS = Path(__file__).resolve().parent
+DOMAIN = 97  # the demo's own, unless one is set: it hears no other match
+THRESHOLD = 9.0  # [s] the paper's for 4v3
+
+
+@dataclasses.dataclass(frozen=True)
+class Args:
+    """How much of everything."""
+
+    out: Path = Path("out/demo")  # folder of all files; an earlier demo there is replaced
+    seed: int = 0  # every random number follows from it
+    episodes: int = 60  # of the recorded 3v2 match
+    source_hours: float = 5.0  # simulated, of 3v2 training of every trial
+    target_hours: float = 3.0  # simulated, of 4v3 training of every trial
+    trials: int = 8  # of the small study
+
+
+def main() -> int:
+    """Do the five steps; print a table and where everything is."""
+    args = parse()
+    os.environ.setdefault("ROS_DOMAIN_ID", str(DOMAIN))
+    shutil.rmtree(args.out, ignore_errors=True)
+    args.out.mkdir(parents=True)
+    start = time.monotonic()
+
+    def say(step: str) -> None:
+        print(f"\n[{time.monotonic() - start:4.0f} s] {step}", flush=True)
+
+    say(f"1. 3v2 keepers learn as ROS nodes for {args.episodes} episodes, recorded")
+    learned = match(args, "3v2", "learn", args.out / "3v2_nodes", args.out / "3v2_bag")
+    say(f"2. {args.trials} x 3 keepers learn 3v2 for {args.source_hours:g} simulated hours, no ROS")
+    script("train.py", "--task", "3v2", "--trials", str(args.trials), "--episodes", "1000000",
+           "--hours", str(args.source_hours), "--seed", str(args.seed), "--processes", "2",
+           "--save-weights", str(args.out / "3v2_trained"))  # fmt: skip
+    sources = sorted((args.out / "3v2_trained").glob("trial_*/keeper_1.npz"))
+    say("3. the transfer node carries keeper_1 of the first trial to 4v3 by rho")
+    carried = args.out / "4v3_start.npz"
+    print(transfer_by_node(sources[0], carried))
+    say("4. 4v3 keepers play on from it as ROS nodes, learning")
+    moved = match(args, "4v3", "learn", args.out / "4v3_nodes", args.out / "4v3_bag", carried)
+    say(f"5. learning curves: 4v3 from scratch and after transfer, {args.trials} trials each")
+    curves = study(args, sources)
+    figure = draw(args, curves)
+    say("done")
+    print(table(learned, moved, curves))
+    print(f"\nlearning curves  {figure}\nbags             {args.out}/3v2_bag, {args.out}/4v3_bag")
+    print(f"weights          {args.out}/3v2_nodes, {args.out}/3v2_trained, {carried}")
+    print(f"watch the match  .venv/bin/python scripts/view.py {args.out}/3v2_bag")
+    return 0
+
+
+def parse() -> Args:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    for field in dataclasses.fields(Args):
+        kind = type(field.default)
+        kind = Path if issubclass(kind, Path) else kind
+        parser.add_argument("--" + field.name.replace("_", "-"), type=kind, default=field.default)
+    return Args(**vars(parser.parse_args()))
+
+
+def script(name: str, *arguments: str) -> None:
+    """Run a script of this folder; it shows its own progress."""
+    subprocess.run([sys.executable, str(SCRIPTS / name), *arguments], check=True)
+
+
+def match(
+    args: Args, task: str, policy: str, weights: Path, bag: Path, start: Path | None = None
+) -> dict[str, Any]:
+    """Play a match of ROS nodes, each a process; its summary."""
+    command = [sys.executable, str(SCRIPTS / "match.py"), "--task", task, "--json"]
+    command += ["--episodes", str(args.episodes), "--keeper-policy", policy]
+    command += ["--seed", str(args.seed), "--save-weights", str(weights), "--record", str(bag)]
+    command += ["--load-weights", str(start)] if start else []
+    lines: list[str] = []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        for line in process.stdout:
+            lines.append(line)
+            if not line.startswith("{"):
+                print(line, end="", flush=True)
+    if process.returncode:
+        raise SystemExit(f"demo: {command[1]} ended with {process.returncode}; see above")
+    summary: dict[str, Any] = json.loads(lines[-1])
+    return summary
+
+
+def transfer_by_node(source: Path, target: Path) -> str:
+    """Start the transfer node, ask it to apply rho, and end it; what it did, in words."""
+    import rclpy
+
+    from keepaway_msgs.srv import ApplyRho
+
+    command = [sys.executable, str(SCRIPTS / "transfer.py"), "node"]
+    with subprocess.Popen(command) as process:
+        rclpy.init()
+        node = rclpy.create_node("demo")
+        try:
+            client = node.create_client(ApplyRho, "transfer/apply")
+            if not client.wait_for_service(timeout_sec=60.0):
+                raise SystemExit("demo: the transfer node does not come; see above")
+            request = ApplyRho.Request(
+                source_path=str(source), target_task="4v3", variant="rho", target_path=str(target)
+            )
+            answer = client.call_async(request)
+            rclpy.spin_until_future_complete(node, answer, timeout_sec=60.0)
+            response = answer.result()
+        finally:
+            node.destroy_node()
+            rclpy.shutdown()
+            process.terminate()
+    if response is None or not response.success:
+        raise SystemExit(f"demo: the transfer node refused: {response and response.message}")
+    message: str = response.message
+    return message
+
+
+def study(args: Args, sources: Sequence[Path]) -> dict[str, list[np.ndarray]]:
+    """Episode durations [s] of every 4v3 trial, from scratch and from its own 3v2 keeper."""
+    starts = []
+    for number, source in enumerate(sources):
+        carried = transferred(load_weights(source), Transfer("4v3"))
+        save_weights(args.out / "4v3_starts" / f"trial_{number:04d}.npz", carried)
+        starts.append(carried.values)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context) as pool:
+        scratch = pool.submit(learn_4v3, args, [None] * len(starts))
+        after = pool.submit(learn_4v3, args, starts)
+        return {"from scratch": scratch.result(), "after transfer from 3v2": after.result()}
+
+
+def learn_4v3(args: Args, starts: Sequence[np.ndarray | None]) -> list[np.ndarray]:
+    """Durations [s] of all episodes of each trial, one trial for each start."""
+    stop = StopRule(max_cycles=int(args.target_hours * 36000))
+    trials = [
+        Trial(trial_seed(args.seed + 1, number), stop, keeper_weights=start, label=number)
+        for number, start in enumerate(starts)
+    ]
+    results = Trainer(TrainerConfig(Task.parse("4v3")), len(trials)).run(trials)
+    in_order = sorted(results, key=lambda result: result.trial.label)
+    return [result.durations / 10.0 for result in in_order]
+
+
+def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
+    """Draw the learning curves."""
+    hours = np.linspace(0.1, args.target_hours * 0.98, 60)
+    curves = {}
+    for label, trials in groups.items():
+        each = np.array([metrics.learning_curve(t, hours, window=200, least=20) for t in trials])
+        curves[label] = plotting.CurveGroup(each, mean_curve(each))
+    title = f"4v3, mean of 200 episodes, {args.trials} trials"
+    figure = plotting.learning_curves(hours, curves, THRESHOLD, title)
+    path = args.out / "learning_curves.png"
+    plotting.save(figure, path, f"scripts/demo.py --seed {args.seed}, {code_version()}")
+    return path
+
+
+def table(
+    learned: dict[str, Any], moved: dict[str, Any], groups: dict[str, list[np.ndarray]]
+) -> str:
+    """What came out, a row each."""
+    rows = [f"{'what':44s} {'held (s)':>9s} {'+-':>5s}"]
+    for summary, label in ((learned, "3v2 nodes, learning"), (moved, "4v3 nodes, after transfer")):
+        label += f", {summary['episodes']} episodes"
+        rows.append(
+            f"{label:44s} {summary['mean_duration_s']:9.2f} {summary['sem_duration_s']:5.2f}"
+        )
+    for label, trials in groups.items():
+        for part, some in (
+            ("first", [t[:200] for t in trials]),
+            ("last", [t[-200:] for t in trials]),
+        ):
+            means = np.array([t.mean() for t in some])
+            error = means.std(ddof=1) / len(means) ** 0.5 if len(means) > 1 else 0.0
+            rows.append(
+                f"{f'4v3 {label}, {part} 200 episodes':44s} {means.mean():9.2f} {error:5.2f}"
+            )
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
