@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.task import Task
+from keepaway_sim.task import MAX_FIELD_SIDE, Task
 
 CYCLE_TIME = 0.1  # [s] S: simulator_step
+ROLL_CYCLES = 128  # entries of the two tables of rolling distances
 NEVER = 65535  # [cycles] age of what was never seen; also "cannot reach the ball"
 
 
@@ -61,7 +62,7 @@ class Vision:
     feel_distance: float = 3.0  # [m] S: visible_distance, felt all round
     certain_distance: float = 20.0  # [m] velocity and body direction are surely seen below
     unsure_distance: float = 40.0  # [m] and never beyond; linear in between
-    look_period: int = 3  # [cycles] two looks in each such period (150 ms against 100 ms)
+    look_period: int = 3  # [cycles] one of so many brings no look (150 ms to 100 ms); 1: all do
     hearing: bool = True  # team-mates' messages about the ball and themselves
     hear_distance: float = 50.0  # [m] S: audio_cut_dist
     hear_step_x: float = 1.45  # [m] P: say-message resolution, 106 m in 73 steps
@@ -114,6 +115,13 @@ class Config:
             decay = getattr(self.physics, name)
             if not 0.0 < decay < 1.0:
                 raise KeepawayError(f"{name}={decay}: give a share between 0 and 1")
+        if not self.vision.look_period >= 1:
+            raise KeepawayError(f"look_period={self.vision.look_period}: give 1 or more cycles")
+        if not 1 <= self.skills.intercept_horizon <= ROLL_CYCLES // 2:
+            raise KeepawayError(
+                f"intercept_horizon={self.skills.intercept_horizon}:"
+                f" give 1 to {ROLL_CYCLES // 2} cycles"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a result's record."""
@@ -180,7 +188,10 @@ _GROUP_NAMES = ("physics", "vision", "skills")
 
 
 def noiseless(config: Config) -> Config:
-    """The same world with every noise source switched off (for tests and for comparison)."""
+    """The same world with every noise source switched off (for tests and for comparison).
+
+    What is left to chance are kick-offs, which cycles bring no look, and who is heard.
+    """
     physics = dataclasses.replace(
         config.physics, movement_noise=False, turn_noise=False, kick_rand=0.0
     )
@@ -192,11 +203,16 @@ def noiseless(config: Config) -> Config:
         speed_step=0.0,
         self_position_error=0.0,
         self_yaw_error=0.0,
+        certain_distance=_EVERYWHERE,
+        hear_step_x=0.0,
+        hear_step_y=0.0,
+        hear_step_velocity=0.0,
     )
     skills = dataclasses.replace(config.skills, whole_commands=False)
     return Config(config.profile, physics, vision, skills)
 
 
+_EVERYWHERE = 2.0 * MAX_FIELD_SIDE  # [m] longer than any field's diagonal
 _GROUPS = (Task, Physics, Vision, Skills)
 _DEGREES = (
     "visible_angle",
@@ -206,8 +222,15 @@ _DEGREES = (
     "mark_turn_angle",
     "search_turn",
 )
+_DIVISORS = (
+    "player_speed_max",
+    "dash_power_rate",
+    "ball_speed_max",
+    "kick_power_rate",
+    "kickable_margin",
+    "pass_end_speed",
+)
 _DERIVED = ("kickable_distance", "touch_distance", "ball_roll", "player_roll")
-ROLL_CYCLES = 128  # entries of the two tables of rolling distances
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
 Constants: Any = namedtuple(  # type: ignore[misc]
@@ -245,3 +268,7 @@ def _check_numbers(group: object) -> None:
             raise KeepawayError(f"{entry.name}={value!r}: give a finite number")
         if value < 0 and entry.name != "min_dash_power":
             raise KeepawayError(f"{entry.name}={value!r}: give a number that is not negative")
+        if value == 0 and entry.name in _DIVISORS:
+            raise KeepawayError(f"{entry.name}={value!r}: give a number above 0")
+        if isinstance(entry.default, int) and value != int(value):
+            raise KeepawayError(f"{entry.name}={value!r}: give a whole number")

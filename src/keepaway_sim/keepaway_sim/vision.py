@@ -359,7 +359,7 @@ def _hear_of_ball(c, s, speech, f, p, speaker):
 @compiled
 def looks_now(c, m, f, p, time):
     """Does player p see something new in this cycle of its field's life?"""
-    return (time + m.look_phase[f, p]) % c.look_period != c.look_period - 1
+    return c.look_period == 1 or (time + m.look_phase[f, p]) % c.look_period != c.look_period - 1
 
 
 @compiled
