@@ -247,3 +247,19 @@ def test_rules_that_never_stop_a_trial_are_refused():
         play([make_trial(0, keeper_policy="best")], 1)
     with pytest.raises(AgentError, match="ordering 'x'"):
         Trainer(TrainerConfig(ordering="x"), 1)
+
+
+def test_takers_that_learn_end_episodes_of_fixed_keepers_sooner_than_hand_coded_ones():
+    fixed = play([make_trial(k, 20, keeper_policy="hand") for k in range(8)], 8)
+    trials = [make_trial(k, 200, keeper_policy="hand", taker_policy="learn") for k in range(8)]
+    learned = play(trials, 8, TrainerConfig())
+    by_hand = np.mean([result.durations.mean() for result in fixed])
+    after_learning = np.mean([result.durations[-100:].mean() for result in learned])
+    assert after_learning < 0.5 * by_hand
+
+
+def test_keepers_that_learn_hold_the_ball_longer():
+    results = play([make_trial(k, 800) for k in range(8)], 8, TrainerConfig())
+    early = np.mean([result.durations[:100].mean() for result in results])
+    late = np.mean([result.durations[-100:].mean() for result in results])
+    assert late > 1.15 * early
