@@ -299,7 +299,8 @@ class Simulator(Node):
         self._perceptions = self._messages.perceptions()
         for seat, data in zip(self.roster.seats, self._perceptions, strict=True):
             self._voice.say(f"{seat.name}/perception", data, stamp)
-        if self.world.perceptions.outcome[0] != Outcome.IN_PLAY:
+        seen = self.world.perceptions
+        if seen.outcome[0] != Outcome.IN_PLAY and seen.episode[0] == self.num_finished:
             self._voice.say("episode", self._messages.episode(self.settings.seed), stamp)
             self.num_finished += 1
 
