@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_agent.trainer import Progress, StopRule, Trainer, TrainerConfig, Trial, trial_seed
 from keepaway_agent.weights import load_weights, save_weights
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
@@ -39,6 +39,8 @@ from keepaway_transfer.statistics import mean_curve
 SCRIPTS = Path(__file__).resolve().parent
 DOMAIN = 97  # the demo's own, unless one is set: it hears no other match
 THRESHOLD = 9.0  # [s] the paper's for 4v3
+CYCLES_PER_HOUR = 36000
+PROGRESS_EVERY = 10.0  # [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,8 +50,8 @@ class Args:
     out: Path = Path("out/demo")  # folder of all files; an earlier demo there is replaced
     seed: int = 0  # every random number follows from it
     episodes: int = 60  # of the recorded 3v2 match
-    source_hours: float = 5.0  # simulated, of 3v2 training of every trial
-    target_hours: float = 3.0  # simulated, of 4v3 training of every trial
+    source_hours: float = 4.0  # simulated, of 3v2 training of every trial
+    target_hours: float = 2.0  # simulated, of 4v3 training of every trial
     trials: int = 8  # of the small study
 
 
@@ -162,19 +164,28 @@ def study(args: Args, sources: Sequence[Path]) -> dict[str, list[np.ndarray]]:
         starts.append(carried.values)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, mp_context=context) as pool:
-        scratch = pool.submit(learn_4v3, args, [None] * len(starts))
-        after = pool.submit(learn_4v3, args, starts)
+        scratch = pool.submit(learn_4v3, args, [None] * len(starts), "from scratch")
+        after = pool.submit(learn_4v3, args, starts, "after transfer")
         return {"from scratch": scratch.result(), "after transfer from 3v2": after.result()}
 
 
-def learn_4v3(args: Args, starts: Sequence[np.ndarray | None]) -> list[np.ndarray]:
+def learn_4v3(args: Args, starts: Sequence[np.ndarray | None], label: str) -> list[np.ndarray]:
     """Durations [s] of all episodes of each trial, one trial for each start."""
-    stop = StopRule(max_cycles=int(args.target_hours * 36000))
+    told = time.monotonic()
+
+    def watch(progress: Progress) -> None:
+        nonlocal told
+        if time.monotonic() - told > PROGRESS_EVERY:
+            told = time.monotonic()
+            hours = progress.cycles / CYCLES_PER_HOUR
+            print(f"{label}: {hours:.1f}/{args.target_hours * len(starts):g} hours", flush=True)
+
+    stop = StopRule(max_cycles=int(args.target_hours * CYCLES_PER_HOUR))
     trials = [
         Trial(trial_seed(args.seed + 1, number), stop, keeper_weights=start, label=number)
         for number, start in enumerate(starts)
     ]
-    results = Trainer(TrainerConfig(Task.parse("4v3")), len(trials)).run(trials)
+    results = Trainer(TrainerConfig(Task.parse("4v3")), len(trials)).run(trials, watch)
     in_order = sorted(results, key=lambda result: result.trial.label)
     return [result.durations / 10.0 for result in in_order]
 
