@@ -4,14 +4,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import rclpy
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from keepaway_agent.actions import Role
+from keepaway_agent.agent import Agent, AgentConfig, MatchFacts
 from keepaway_agent.nodes.player import Player
 from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, TrialResult, trial_seed
+from keepaway_agent.weights import LearnedWeights
 from keepaway_msgs.msg import Episode
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.nodes.voice import ALL
@@ -109,3 +112,12 @@ def trained(episodes: int, seed: int = 0, policy: str = "hand", task: str = "3v2
 
 def played(trial: TrialResult) -> Played:
     return list(zip(trial.durations.tolist(), trial.outcomes.tolist(), strict=True))
+
+
+def weights_of(num_keepers: int = 3, num_takers: int = 2) -> LearnedWeights:
+    """Random weights of a keeper."""
+    facts = MatchFacts(num_keepers, num_takers, 25.0, 25.0, 0.1, seed=1)
+    agent = Agent(facts, 0, AgentConfig(policy="learn"))
+    agent.learners.weights[:] = np.random.default_rng(2).normal(size=agent.learners.weights.shape)
+    agent.episodes, agent.hours = 100, 0.5
+    return agent.learned("keeper_1")
