@@ -29,6 +29,9 @@ from keepaway_agent.weights import LearnedWeights
 
 COLOURS: Final = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9", "#444444")
 """Okabe and Ito's, which colour-blind people can tell apart; the first is the first action's."""
+TAKER_DISTANCE: Final = 5.0  # [m] of the scene's takers from the ball's holder
+TAKER_SPREAD: Final = math.radians(30.0)  # between two of them, as K1 sees them
+PALEST: Final = 0.3  # share of an action's colour where it is hardly better than the next
 UNTRAINED: Final = (0.93, 0.93, 0.93)
 GRID: Final = 61  # places along a side at which the moving taker is put
 
@@ -131,18 +134,19 @@ def save(figure: Figure, path: Path, made_by: str = "") -> None:
 def scene(weights: LearnedWeights) -> np.ndarray:
     """A typical moment, (num_players + 1, 2) [m]: K1 holds the ball in a corner of the field.
 
-    Keepers stand on a ring, the first with the ball and the second nearest to it; takers stand
-    around the centre. The moving taker is the first of them.
+    Keepers stand on a ring, the first with the ball and the second nearest to it; takers come at
+    the ball from the centre, side by side. The moving taker is the first of them.
     """
     n, m = weights.num_keepers, weights.num_takers
-    turn = 2 * math.pi / n
-    keepers = [-0.75 * math.pi + turn * (k - 0.25 * (k > 0)) for k in range(n)]
-    takers = [2 * math.pi * j / m for j in range(m)]
     size = np.array([weights.field_length, weights.field_width])
-    place = [0.38 * size * (math.cos(a), math.sin(a)) for a in keepers]
-    place += [0.10 * size * (math.cos(a), math.sin(a)) for a in takers]
-    ball = place[0] + 0.6 * (place[1] - place[0]) / np.linalg.norm(place[1] - place[0])
-    return np.array([*place, ball])
+    corner = -0.75 * math.pi
+    ring = [corner + 2 * math.pi / n * (k - 0.25 * (k > 0)) for k in range(n)]
+    keepers = [0.38 * size * (math.cos(a), math.sin(a)) for a in ring]
+    coming = [corner + math.pi + TAKER_SPREAD * (j - (m - 1) / 2) for j in range(m)]
+    takers = [keepers[0] + TAKER_DISTANCE * np.array((math.cos(a), math.sin(a))) for a in coming]
+    lane = keepers[1] - keepers[0]
+    ball = keepers[0] + 0.6 * lane / np.linalg.norm(lane)
+    return np.array([*keepers, *takers, ball])
 
 
 def preferences(weights: LearnedWeights, taker_x: np.ndarray, taker_y: np.ndarray) -> Preferences:
@@ -189,8 +193,8 @@ def _draw_map(
     """Each place in the colour of its action, the paler the smaller the margin."""
     own = itertools.islice(itertools.cycle(COLOURS), len(weights.action_names))
     colours = np.array([*map(to_rgb, own), UNTRAINED])  # the last is for -1
-    strong = np.quantile(shown.margin, 0.9) or 1.0
-    depth = np.clip(shown.margin / strong, 0.15, 1.0)[..., None]
+    strong = np.quantile(shown.margin, 0.8) or 1.0
+    depth = np.clip(PALEST + (1.0 - PALEST) * shown.margin / strong, 0.0, 1.0)[..., None]
     pixels = 1.0 - depth * (1.0 - colours[shown.action])
     pixels[shown.action < 0] = UNTRAINED
     extent = (x[0], x[-1], y[0], y[-1])
