@@ -208,11 +208,11 @@ def table(
     learned: dict[str, Any], moved: dict[str, Any], groups: dict[str, list[np.ndarray]]
 ) -> str:
     """What came out, a row each."""
-    rows = [f"{'what':44s} {'held (s)':>9s} {'+-':>5s}"]
+    rows = [f"{'what':48s} {'held (s)':>9s} {'+-':>5s}"]
     for summary, label in ((learned, "3v2 nodes, learning"), (moved, "4v3 nodes, after transfer")):
         label += f", {summary['episodes']} episodes"
         rows.append(
-            f"{label:44s} {summary['mean_duration_s']:9.2f} {summary['sem_duration_s']:5.2f}"
+            f"{label:48s} {summary['mean_duration_s']:9.2f} {summary['sem_duration_s']:5.2f}"
         )
     for label, trials in groups.items():
         for part, some in (
@@ -222,7 +222,7 @@ def table(
             means = np.array([t.mean() for t in some])
             error = means.std(ddof=1) / len(means) ** 0.5 if len(means) > 1 else 0.0
             rows.append(
-                f"{f'4v3 {label}, {part} 200 episodes':44s} {means.mean():9.2f} {error:5.2f}"
+                f"{f'4v3 {label}, {part} 200 episodes':48s} {means.mean():9.2f} {error:5.2f}"
             )
     return "\n".join(rows)
 
