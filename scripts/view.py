@@ -1,10 +1,13 @@
-"""Watch a recorded match in a browser, or take a picture of a moment.
+"""Watch a match in a browser, recorded or live, or take a picture of a moment.
 
     .venv/bin/python scripts/view.py out/bag                      # writes out/bag/replay.html
     .venv/bin/python scripts/view.py out/bag --episodes 0,90-99 --out match.html
     .venv/bin/python scripts/view.py out/bag --picture pass.png --episodes 3 --time 2.4
+    .venv/bin/python scripts/view.py --live                       # the match that is on
+    .venv/bin/python scripts/view.py --live --port 8080 --ros-args -r __ns:=/match_2
 
-The page is one file and needs no network.
+The page of a recording is one file and needs no network. That of a live match is served to this
+machine only; --host 0.0.0.0 lets the whole network watch. What follows --ros-args goes to the node.
 """
 
 import argparse
@@ -12,14 +15,22 @@ import math
 import sys
 from pathlib import Path
 
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+
 from keepaway_sim.episodes import MatchBag
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.live import Server
+from keepaway_sim.nodes.spectator import Spectator
 from keepaway_sim.viewer import numbers_in, picture, replay_page
 
 
 def main() -> int:
     """Write the page or the picture."""
-    args = parse()
+    args, ros = parse()
+    if args.live:
+        return watch(args.host, args.port, ros)
     try:
         numbers = numbers_in(args.episodes) if args.episodes else None
         if args.picture:
@@ -31,6 +42,28 @@ def main() -> int:
     out = args.out or (args.bag if args.bag.is_dir() else args.bag.parent) / "replay.html"
     out.write_text(text, encoding="utf-8")
     print(f"{out} ({len(text) / 1e6:.1f} MB): open it in a browser")
+    return 0
+
+
+def watch(host: str, port: int, ros: list[str]) -> int:
+    """Serve the page of the match that is on, until Ctrl-C."""
+    rclpy.init(args=ros)
+    try:
+        server = Server(host, port)
+    except OSError as error:
+        print(f"view: {host}:{port}: {error}", file=sys.stderr)
+        return 1
+    executor = EventsExecutor()
+    executor.add_node(Spectator(server.match))
+    print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
+    try:
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=1.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        server.close()
+        rclpy.try_shutdown()
     return 0
 
 
@@ -49,18 +82,28 @@ def take_picture(args: argparse.Namespace, number: int) -> int:
     return 0
 
 
-def parse() -> argparse.Namespace:
-    """The command line."""
+def parse() -> tuple[argparse.Namespace, list[str]]:
+    """The command line: the script's options and ROS's."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="folder of the bag")
+    parser.add_argument("bag", type=Path, metavar="BAG", nargs="?", help="folder of the bag")
     parser.add_argument("--episodes", help="that can be watched, like 7 or 0,90-99; default: some")
     parser.add_argument("--out", type=Path, help="page to write (default BAG/replay.html)")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="a picture instead of a page")
     parser.add_argument("--time", type=float, default=0.0, help="of the picture [s]")
     parser.add_argument("--player", help="whose belief the picture shows, like keeper_1")
-    return parser.parse_args()
+    parser.add_argument(
+        "--live", action="store_true", help="serve the page of the match that is on"
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="to serve on (default 127.0.0.1)")
+    parser.add_argument("--port", type=int, default=8000, help="to serve on (default 8000)")
+    words = sys.argv[1:]
+    at = words.index("--ros-args") if "--ros-args" in words else len(words)
+    args = parser.parse_args(words[:at])
+    if args.live == bool(args.bag):
+        parser.error("name a bag, or --live")
+    return args, words[at:]
 
 
 if __name__ == "__main__":
