@@ -227,7 +227,7 @@ def test_a_player_too_fast_to_turn_stops_first():
 
 def test_a_player_runs_to_a_ball_ahead_and_turns_to_one_behind():
     scene = Scene("o . . . . . . . 1 . . . . . . . .")
-    assert scene.command("1", GO) == (TURN, 0.0, approx(180.0))
+    assert scene.command("1", GO) == approx((TURN, 0.0, 180.0))
     scene.put("o", 16.0, 0.0)
     assert scene.command("1", GO) == approx((DASH, 100.0, 0.0))
 
