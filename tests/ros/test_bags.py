@@ -8,10 +8,24 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+from graph import PATIENCE, Graph
 from recorded import record_match
+from rosbags.highlevel import AnyReader
 
+from keepaway_agent.actions import Role
+from keepaway_agent.nodes.player import Player
+from keepaway_msgs.msg import ActionRequest
+from keepaway_sim.episodes import MatchBag
+from keepaway_sim.gaps import count_gaps
+from keepaway_sim.live import Server
+from keepaway_sim.messages import clean_request
+from keepaway_sim.nodes.recorder import Recorder
+from keepaway_sim.nodes.replayer import Replayer
+from keepaway_sim.nodes.spectator import Spectator
+from keepaway_sim.options import ros_arguments
 from keepaway_sim.recording import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -71,3 +85,120 @@ def test_a_replay_says_byte_for_byte_what_was_recorded(
     info = BagReader(tmp_path / "again").info
     assert info["gaps"].startswith("nothing is missing")
     assert not any(json.loads(info["missing"]).values())
+
+
+def start_recorder(graph: Graph, path: Path, **parameters: object) -> Recorder:
+    arguments = ros_arguments({"path": str(path), **parameters}, "recorder")
+    return Recorder(context=graph.context, cli_args=arguments, use_global_arguments=False)
+
+
+def said_by_the_match(bag: Path) -> dict[str, list[bytes]]:
+    """All but what players say of themselves, which they say more often than the bag needs."""
+    return {
+        topic: [clean_request(data) for data in said] if topic.endswith("request") else said
+        for topic, said in by_topic(bag).items()
+        if not topic.endswith("/status")
+    }
+
+
+def test_a_recorder_has_what_the_simulator_wrote_itself(graph: Graph, tmp_path: Path) -> None:
+    recorder = start_recorder(graph, tmp_path / "heard")
+    graph.hook = recorder.poll
+    graph.start_simulator(episodes=2, seed=3, record=str(tmp_path / "said"), wait_for_recorder=True)
+    graph.start_players(policy="random")
+    graph.play()
+    graph.simulator.close()
+    assert recorder.finish().startswith("nothing is missing of ")
+    recorder.destroy_node()
+    assert said_by_the_match(tmp_path / "heard") == said_by_the_match(tmp_path / "said")
+    with AnyReader([tmp_path / "heard"]) as theirs:
+        assert theirs.message_count == BagReader(tmp_path / "heard").message_count
+
+
+def test_in_lock_step_the_simulator_waits_for_its_recorder(graph: Graph, tmp_path: Path) -> None:
+    recorder = start_recorder(graph, tmp_path / "bag")
+    furthest: list[int] = []
+
+    def poll_rarely() -> None:
+        """Only when the simulator has waited a while."""
+        lag = graph.simulator._recorder_lag()
+        furthest.append(lag)
+        if lag > 50 or graph.simulator._recorded is None or furthest[-100:] == [lag] * 100:
+            recorder.poll()
+
+    graph.hook = poll_rarely
+    graph.start_simulator(episodes=3, seed=3, wait_for_recorder=True, answer_timeout=PATIENCE)
+    graph.start_players(policy="hold")
+    graph.play()
+    assert recorder.finish().startswith("nothing is missing of ")
+    recorder.destroy_node()
+    assert max(furthest) == 51  # one more than it may be behind: then it waits
+    assert len(list(MatchBag(tmp_path / "bag").episodes())) == 3
+
+
+def test_what_a_recorder_loses_it_names(graph: Graph, tmp_path: Path) -> None:
+    recorder = start_recorder(graph, tmp_path / "bag", history=5)
+    polls = iter(range(10**9))
+
+    def poll_too_rarely() -> None:
+        if graph.simulator.num_cycles == 0 or next(polls) % 300 == 0:
+            recorder.poll()
+
+    graph.hook = poll_too_rarely
+    graph.start_simulator(episodes=2, seed=3)
+    graph.start_players()
+    graph.play()
+    report = recorder.finish()
+    missing = {topic: count for topic, count in recorder.gaps.missing().items() if count}
+    recorder.destroy_node()
+    assert missing
+    for topic, count in missing.items():
+        assert f"{topic} misses {count} cycles" in report
+    info = BagReader(tmp_path / "bag").info
+    assert json.loads(info["missing"]) == recorder.gaps.missing()
+    assert count_gaps(BagReader(tmp_path / "bag")).missing() == recorder.gaps.missing()
+
+
+def test_a_keeper_fed_from_a_bag_answers_what_it_answered(graph: Graph, tmp_path: Path) -> None:
+    graph.start_simulator(episodes=2, seed=8, record=str(tmp_path / "bag"))
+    graph.start_players(policy="learn")
+    graph.play()
+    graph.simulator.close()
+    recorded = said_by_the_match(tmp_path / "bag")["/keeper_2/action_request"]
+
+    settings = {"path": str(tmp_path / "bag"), "rate": 50.0, "start_delay": 1.0,
+                "topics": "match,keeper_2/perception", "wait_for_subscribers": 2}  # fmt: skip
+    own: dict[str, Any] = {"context": graph.context, "use_global_arguments": False}
+    replayer = graph.add(Replayer(cli_args=ros_arguments(settings, "replayer", "/again"), **own))
+    answers: list[bytes] = []
+    graph.node.create_subscription(
+        ActionRequest, "/again/keeper_2/action_request",
+        lambda data: answers.append(clean_request(data)), 100, raw=True,
+    )  # fmt: skip
+    learner = ros_arguments({"policy": "learn"}, "keeper_2", "/again")
+    graph.add(Player(Role.KEEPER, cli_args=learner, **own))
+    count = replayer.play(graph.executor.spin_once)
+    assert count == 1 + BagReader(tmp_path / "bag").counts["/keeper_2/perception"]
+    graph.spin_until(lambda: len(answers) >= len(recorded))
+    assert answers == recorded
+
+
+def test_a_live_page_is_told_what_nodes_say(graph: Graph, tmp_path: Path) -> None:
+    server = Server()
+    graph.add(
+        Spectator(server.match, context=graph.context, cli_args=[], use_global_arguments=False)
+    )
+    graph.start_simulator(episodes=2, seed=3, record=str(tmp_path / "bag"))
+    graph.start_players()
+    with server.browser() as events:
+        graph.play()
+        graph.spin_until(lambda: len(server.match.history) == 3)
+        kinds = [kind for kind, _ in events.queue]
+    graph.simulator.close()
+    server.close()
+    assert kinds[0] == "match"
+    assert kinds.count("episode") == 2
+    assert kinds.count("frame") >= 4
+    told = [json.loads(data) for kind, data in server.match.history if kind == "episode"]
+    expected = list(MatchBag(tmp_path / "bag").episodes())
+    assert [entry["outcome"] for entry in told] == [episode.outcome for episode in expected]
