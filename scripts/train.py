@@ -49,7 +49,7 @@ def main() -> int:
         training = Training(**chosen)
         command = shlex.join(["scripts/train.py", *sys.argv[1:]])
         folder = (
-            TrainingFolder(arguments.save_weights, training, command)
+            TrainingFolder(arguments.save_weights, training, command, arguments.any_code)
             if arguments.save_weights
             else None
         )
@@ -177,6 +177,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--save-weights", type=Path, metavar="DIR", help="folder of the results")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="to spread over")
     parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="side by side in a process")
+    parser.add_argument("--any-code", action="store_true", help="go on though the code has changed")
     parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
     add_options(parser, Training)
     arguments = parser.parse_args()

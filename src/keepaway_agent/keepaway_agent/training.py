@@ -258,13 +258,16 @@ class TrainingFolder:
         done: numbers of the trials that are there.
     """
 
-    def __init__(self, path: Path, training: Training, command: str = "") -> None:
+    def __init__(
+        self, path: Path, training: Training, command: str = "", any_code: bool = False
+    ) -> None:
         """Begin a folder, or go on with the one that is there.
 
         Args:
             path: where; made if it is missing.
             training: whose results it holds.
             command: that makes them, for the record.
+            any_code: go on also if another version of the code began it.
 
         Raises:
             AgentError: a folder of something else, or of other settings or another version.
@@ -281,7 +284,7 @@ class TrainingFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
             if (path / "training.json").exists():
-                _check_same(path, self._record)
+                _check_same(path, self._record, any_code)
             elif any(path.iterdir()):
                 raise AgentError(f"{path} holds something else: name another folder")
             else:
@@ -367,7 +370,7 @@ def _write_whole(path: Path, text: str) -> None:
     beside.replace(path)
 
 
-def _check_same(path: Path, record: dict[str, Any]) -> None:
+def _check_same(path: Path, record: dict[str, Any], any_code: bool) -> None:
     """Refuse to mix results of different settings or versions."""
     try:
         there = json.loads((path / "training.json").read_text(encoding="utf-8"))
@@ -380,8 +383,8 @@ def _check_same(path: Path, record: dict[str, Any]) -> None:
                 f"{path} holds a training with {name}={settings.get(name)!r}, not {value!r}:"
                 " use the same settings, or name another folder"
             )
-    if version != record["code_version"]:
+    if version != record["code_version"] and not any_code:
         raise AgentError(
-            f"{path} was made by version {version}, this is {record['code_version']}:"
-            " name another folder"
+            f"{path} was begun by version {version}, this is {record['code_version']}:"
+            " name another folder, or allow it (--any-code)"
         )
