@@ -269,6 +269,16 @@ def test_a_dash_brings_a_near_ball_into_reach():
     assert scene.command("1", GO) == approx((DASH, 100.0, 0.0))
 
 
+def test_whoever_dashes_backward_in_vain_turns_in_the_end():
+    scene = Scene("o . 1")  # the server of v19 takes a dash with negative power for none
+    commands = [scene.command("1", GO) for _ in range(scene.c.patience + 1)]
+    assert commands[:-1] == [(DASH, -100.0, 0.0)] * scene.c.patience
+    assert abs(commands[-1][2]) == approx(180.0)
+    assert scene.command("1", GO)[0] == TURN
+    scene.face("1", 180.0)
+    assert scene.command("1", GO) == approx((DASH, 100.0, 0.0))
+
+
 def test_a_taker_with_the_ball_holds_it_close():
     scene = Scene("a o 1")
     scene.put("o", 0.0, 0.8)

@@ -272,6 +272,21 @@ def see(world: World, places: list[tuple[float, float]]) -> None:
     world.perceptions.ball_kickable[0] = away < 1.085
 
 
+def test_no_taker_stays_for_ever_where_it_cannot_dash_backward():
+    # v19: both takers have the ball 1.3 m behind them, and its keeper holds it there
+    world = started(Task(), profile("v19"), [1])
+    places = [(-8.7, 7.8), (-7.7, -8.6), (6.49, 5.46), (7.42, 6.41), (6.99, 5.79), (5.65, 5.62)]
+    see(world, places)
+    world.state.yaw[0] = 0.0, 0.0, 1.81, 0.34, -0.19
+    world.perceptions.body[0] = world.state.yaw[0]
+    action = np.array([[OPEN, OPEN, HOLD, GO, GO]])
+    for _ in range(300):
+        world.step(action, np.zeros_like(action))
+        if world.perceptions.outcome[0] != Outcome.IN_PLAY:
+            break
+    assert world.perceptions.outcome[0] != Outcome.IN_PLAY
+
+
 def play(config: Config, numbers: list[int], cycles: int = 60) -> World:
     """A world after some cycles of hold and get open, the same for all fields."""
     world = started(Task(), config, numbers)

@@ -91,6 +91,7 @@ class Skills:
     ball_lost_age: int = 10  # [cycles] ball unseen for longer: search (confidence 0.90)
     player_lost_age: int = 12  # [cycles] player unseen for longer: unknown (confidence 0.88)
     intercept_horizon: int = 30  # [cycles]
+    patience: int = 20  # [cycles] of dashing backward in vain (v19 forbids it), then turn
     pass_by_rank: bool = True  # P: a pass in two kicks goes to the then k-th closest keeper
     whole_commands: bool = True  # powers and angles of commands are cut to whole numbers
 

@@ -41,6 +41,7 @@ OVER_POWER_PRESSED = 1.30  # with an opponent within PRESSED_RANGE of the ball
 PRESSED_RANGE = 2.0  # [m]
 CLOSE_RANGE = 3.0  # [m] an opponent so near makes a player take the ball at once
 FACING = math.radians(25.0)  # [rad] faces its direction of play well enough
+AT_REST = 0.01  # [m/cycle] a slower player did not move
 MARK_NEAR = 2.0  # [m] at the marking place: stand sideways
 MARK_SIDEWAYS = math.radians(80.0)
 MARK_LEAD = 1.0  # [m] P: a marked player is expected so far toward the marker's goal
@@ -66,15 +67,31 @@ def command(c, s, m, f, p, action, target):
         x, y = s.position[f, p, target]
         return _whole(c, kick_to(c, s, f, p, x, y, c.pass_end_speed))
     if action == _OPEN:
-        chosen = get_open(c, s, m, f, p)
+        chosen = _patient(c, s, m, f, p, get_open(c, s, m, f, p))
         _look_at(c, s, f, p, 0.0, 0.0, chosen)
     elif action == _MARK:
-        chosen = mark_keeper(c, s, f, p, target)
+        chosen = _patient(c, s, m, f, p, mark_keeper(c, s, f, p, target))
         _look_at(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], chosen)
     else:
-        chosen = go_to_ball(c, s, m, f, p)
+        chosen = _patient(c, s, m, f, p, go_to_ball(c, s, m, f, p))
         _look_at(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], chosen)
     return _whole(c, chosen)
+
+
+@compiled
+def _patient(c, s, m, f, p, chosen):
+    """The chosen command, or a turn to the ball after too many backward dashes in vain.
+
+    S since 17.0.0 takes a backward dash for none; P does not know, and some of its players would
+    dash on for ever behind a ball that is held beside them.
+    """
+    ball = c.num_keepers + c.num_takers
+    vx, vy = s.velocity[f, p, p]
+    in_vain = chosen[0] == DASH and chosen[1] < 0.0 and length(vx, vy) < AT_REST
+    m.vain_dashes[f, p] = m.vain_dashes[f, p] + 1 if in_vain else 0
+    if m.vain_dashes[f, p] <= c.patience:
+        return chosen
+    return turn_body_to(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], 1)
 
 
 @compiled

@@ -79,6 +79,7 @@ class Memory(NamedTuple):
     pass_rank: np.ndarray  # (F, P) int64 receiver's rank by distance then, 0 the closest
     intercept_cycle: np.ndarray  # (F, P) int64 cycle in which the ball is to be met
     intercept_point: np.ndarray  # (F, P, 2) [m] and where
+    vain_dashes: np.ndarray  # (F, P) int64 cycles in a row of dashing backward at rest
     search_cycle: np.ndarray  # (F, P) int64 last cycle of a search
     search_sign: np.ndarray  # (F, P) which way round
     open_x: np.ndarray  # (25,) [m] the points where a keeper may get open
@@ -133,6 +134,7 @@ def make_memory(c: Any, num_fields: int) -> Memory:
         pass_rank=np.zeros(shape, dtype=np.int64),
         intercept_cycle=np.full(shape, -10, dtype=np.int64),
         intercept_point=np.zeros((*shape, 2)),
+        vain_dashes=np.zeros(shape, dtype=np.int64),
         search_cycle=np.full(shape, -10, dtype=np.int64),
         search_sign=np.ones(shape),
         open_x=open_x.ravel(),
@@ -160,6 +162,7 @@ def forget(c, s, m, f, p, uniforms, cursor):
     m.pass_cycle[f, p] = -2
     m.intercept_cycle[f, p] = -10
     m.search_cycle[f, p] = -10
+    m.vain_dashes[f, p] = 0
     m.look_phase[f, p] = int(draw(uniforms, cursor, f) * c.look_period)
 
 
