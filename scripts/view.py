@@ -3,6 +3,7 @@
     .venv/bin/python scripts/view.py out/bag                      # writes out/bag/replay.html
     .venv/bin/python scripts/view.py out/bag --episodes 0,90-99 --out match.html
     .venv/bin/python scripts/view.py out/bag --picture pass.png --episodes 3 --time 2.4
+    .venv/bin/python scripts/view.py out/bag --add-markers out/for_foxglove
     .venv/bin/python scripts/view.py --live                       # the match that is on
     .venv/bin/python scripts/view.py --live --port 8080 --ros-args -r __ns:=/match_2
 
@@ -19,11 +20,13 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 
-from keepaway_sim.episodes import MatchBag
+from keepaway_sim.episodes import MatchBag, with_markers
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.live import Server
 from keepaway_sim.nodes.spectator import Spectator
 from keepaway_sim.viewer import numbers_in, picture, replay_page
+
+LAYOUT = Path(__file__).resolve().parents[1] / "src/keepaway_sim/foxglove/keepaway.json"
 
 
 def main() -> int:
@@ -33,6 +36,10 @@ def main() -> int:
         return watch(args.host, args.port, ros)
     try:
         numbers = numbers_in(args.episodes) if args.episodes else None
+        if args.add_markers:
+            made = with_markers(args.bag, args.add_markers)
+            print(f"{made.path}: {made.message_count} messages; open it in Foxglove with {LAYOUT}")
+            return 0
         if args.picture:
             return take_picture(args, min(numbers) if numbers else 0)
         text = replay_page(args.bag, numbers)
@@ -91,6 +98,7 @@ def parse() -> tuple[argparse.Namespace, list[str]]:
     parser.add_argument("--episodes", help="that can be watched, like 7 or 0,90-99; default: some")
     parser.add_argument("--out", type=Path, help="page to write (default BAG/replay.html)")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="a picture instead of a page")
+    parser.add_argument("--add-markers", type=Path, metavar="NEW", help="copy with /markers")
     parser.add_argument("--time", type=float, default=0.0, help="of the picture [s]")
     parser.add_argument("--player", help="whose belief the picture shows, like keeper_1")
     parser.add_argument(

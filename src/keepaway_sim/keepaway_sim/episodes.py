@@ -127,6 +127,32 @@ class EpisodeSummary(NamedTuple):
     lost_by: int  # player index; -1 nobody
 
 
+def with_markers(path: Path | str, output: Path | str) -> BagReader:
+    """Write a copy of a match's bag in which /markers show every cycle, for Foxglove and RViz.
+
+    Raises:
+        KeepawayError: no bag of a match, or the output exists.
+    """
+    match = MatchBag(path)
+    reader, states, markers = match.reader, match.topic("field_state"), match.topic("markers")
+    decode = reader.codec(states).decode
+    with BagWriter(output, reader.info) as bag:
+        for name, data in reader.attachments():
+            bag.attach(name, data)
+        for topic in reader.topics.values():
+            bag.add_topic(*topic[:2], topic.qos, topic.definition, topic.type_hash)
+        for message in reader.messages(reader.topics.keys() - {markers}):
+            bag.write(message.topic, message.message_type, message.data, message.log_time)
+            if message.topic == states:
+                state = decode(message.data)
+                position = np.array(state["positions"]).reshape(-1, 2)
+                shown = messages.marker_array(
+                    match.task, position, np.array(state["yaws"]), message.log_time
+                )
+                bag.write(markers, messages.MARKERS, shown, message.log_time)
+    return BagReader(output)
+
+
 def episode_summaries(batch: Batch) -> Iterator[EpisodeSummary]:
     """The episodes that a batch of Episode messages tells of."""
     for entry in batch.data:
