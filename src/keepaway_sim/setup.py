@@ -12,11 +12,12 @@ setup(
     description=package.findtext("description"),
     license=package.findtext("license"),
     packages=find_packages(include=[name, f"{name}.*"]),
-    package_data={name: ["**/*.json", "**/*.toml"]},
+    package_data={name: ["**/*.json", "**/*.toml", "web/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml"]),
         (f"share/{name}/launch", ["launch/match.launch.py"]),
+        (f"share/{name}/foxglove", ["foxglove/keepaway.json"]),
     ],
     entry_points={
         "console_scripts": [
