@@ -82,7 +82,10 @@ def take_picture(args: argparse.Namespace, number: int) -> int:
         raise KeepawayError(f"episode {number} is not in {args.bag}")
     track = bag.track(episode)
     row = min(round(args.time / bag.match["cycle_time"]), len(track.time) - 1)
-    player = bag.task.player_names.index(args.player) if args.player else -1
+    names = bag.task.player_names
+    if args.player not in (None, *names):
+        raise KeepawayError(f"player {args.player!r}: the match has {', '.join(names)}")
+    player = names.index(args.player) if args.player else -1
     angle = bag.match["visible_angle"]
     picture(track, row, bag.task, angle, player).savefig(args.picture)
     print(f"{args.picture}: episode {number} at {math.floor(10 * args.time) / 10} s")
