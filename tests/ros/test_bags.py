@@ -103,7 +103,11 @@ def said_by_the_match(bag: Path) -> dict[str, list[bytes]]:
 
 def test_a_recorder_has_what_the_simulator_wrote_itself(graph: Graph, tmp_path: Path) -> None:
     recorder = start_recorder(graph, tmp_path / "heard")
-    graph.hook = lambda: None if recorder.poll() else None
+
+    def listen() -> None:
+        recorder.poll()
+
+    graph.hook = listen
     graph.start_simulator(episodes=2, seed=3, record=str(tmp_path / "said"), wait_for_recorder=True)
     graph.start_players(policy="random")
     graph.play()

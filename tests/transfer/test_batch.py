@@ -30,8 +30,8 @@ def runs(monkeypatch):
     seen = []
 
     class Watched(Trainer):
-        def run(self, trials, watch=None):
-            for result in super().run(trials, watch):
+        def run(self, trials, watch=None, watch_cycle=None):
+            for result in super().run(trials, watch, watch_cycle):
                 seen.append((self.config.task.name, result))
                 yield result
 

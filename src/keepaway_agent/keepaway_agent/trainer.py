@@ -172,13 +172,17 @@ class Trainer:
         self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
 
     def run(
-        self, trials: Iterable[Trial], watch: Callable[[Progress], None] | None = None
+        self,
+        trials: Iterable[Trial],
+        watch: Callable[[Progress], None] | None = None,
+        watch_cycle: Callable[[World], None] | None = None,
     ) -> Generator[TrialResult, None, None]:
         """Play trials, and give each one's result as soon as it is over.
 
         Args:
             trials: as many as one likes; the next is asked for when a field is free.
             watch: is told of the progress every WATCH_INTERVAL cycles.
+            watch_cycle: is shown the world before every cycle.
 
         Raises:
             AgentError: a trial that cannot be played.
@@ -197,6 +201,8 @@ class Trainer:
                         yield result
                 if not self._world.state.running.any():
                     return
+                if watch_cycle:
+                    watch_cycle(self._world)
                 self._world.step(self._action, self._target)
                 if watch and cycle % WATCH_INTERVAL == 0:
                     watch(self.progress)

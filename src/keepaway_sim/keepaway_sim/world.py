@@ -71,6 +71,11 @@ class World:
             np.zeros(num + 1, dtype=np.bool_),
         )
 
+    @property
+    def commands(self) -> np.ndarray:
+        """(F, P, 3) every player's last command: kind (`vision.DASH` ..), power, angle [rad]."""
+        return self._memory.command
+
     def start(self, field: int, seed: np.random.SeedSequence) -> None:
         """Give a field a fresh trial with its own random numbers, and kick off.
 
