@@ -61,14 +61,15 @@ def test_places_stay_within_their_jitter():
 @pytest.mark.parametrize(
     ("cycles", "ended"),
     [
-        ("TTTT", 4),
-        ("BBBB", 4),  # a taker near counts, also with a keeper near
-        ("TBTB", 4),
-        ("T-T--TT", 7),  # nobody near: the count stays
-        ("TTTKTTT", None),  # a cycle with keepers only clears it
-        ("TTTKTTTT", 8),
-        ("KKKK", None),
-        ("----", None),
+        ("TTTT-", 5),  # in the cycle after the fourth, as in games recorded on the server
+        ("TTTTK", 5),  # whoever is near then
+        ("BBBBB", 5),  # a taker near counts, also with a keeper near
+        ("TBTBT", 5),
+        ("T-T--TT-", 8),  # nobody near: the count stays
+        ("TTTKTTT-", None),  # a cycle with keepers only clears it
+        ("TTTKTTTTK", 9),
+        ("KKKKKK", None),
+        ("------", None),
     ],
 )
 def test_the_take_counter(cycles, ended):
@@ -76,10 +77,10 @@ def test_the_take_counter(cycles, ended):
     position, count = np.zeros((6, 2)), 0
     ends = None
     for cycle, who in enumerate(cycles, start=1):
-        count = referee.next_take_count(count, who in "KB", who in "TB")
         if referee.outcome(c, position, count) == Outcome.TAKEN_AWAY:
             ends = cycle
             break
+        count = referee.next_take_count(count, who in "KB", who in "TB")
     assert ends == ended
 
 

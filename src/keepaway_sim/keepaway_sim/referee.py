@@ -8,7 +8,7 @@ from keepaway_sim.physics import on_grid
 from keepaway_sim.streams import draw
 from keepaway_sim.task import Outcome
 
-TAKE_CYCLES = 4  # the ball is taken after so many cycles that no keeper-only cycle interrupts
+TAKE_CYCLES = 4  # the ball is taken in the cycle after so many with a taker near
 CORNER_JITTER = 3.0  # [m] players start up to so far inward from their corner
 BALL_INSET = 4.0  # [m] the ball starts so far inward from the corner (-x, -y)
 
@@ -76,7 +76,11 @@ def next_take_count(count, keeper_near, taker_near):
 
 @compiled
 def outcome(c, position, take_count):
-    """Outcome of the cycle just played: out of bounds comes first, as in the server."""
+    """Outcome of the cycle just played, by the take counter as it was before it.
+
+    Out of bounds comes first. The server looks at its counter before it counts, so that the ball
+    is taken one cycle after the counter reached TAKE_CYCLES, and may still leave the field in it.
+    """
     ball = len(position) - 1
     inside_x = abs(position[ball, 0]) < c.field_length / 2.0
     inside_y = abs(position[ball, 1]) < c.field_width / 2.0

@@ -352,8 +352,10 @@ def _settle(c, state, s, m, speech, motion, place, radius, touched, scratch, uni
         taker = referee.near_ball(c, state.position[f], c.num_keepers, num)
         if keeper >= 0:
             state.last_keeper[f] = keeper
-        state.take_count[f] = referee.next_take_count(state.take_count[f], keeper >= 0, taker >= 0)
-        s.outcome[f] = referee.outcome(c, state.position[f], state.take_count[f])
+        count = state.take_count[f]
+        s.outcome[f] = referee.outcome(c, state.position[f], count)
+        if s.outcome[f] == _IN_PLAY:
+            state.take_count[f] = referee.next_take_count(count, keeper >= 0, taker >= 0)
         _perceive(c, state, s, m, speech, uniforms, cursor, f)
 
 
