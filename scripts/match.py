@@ -110,6 +110,7 @@ def player_settings(args: argparse.Namespace, name: str, role: TaskRole) -> dict
         settings["load_weights"] = str(given / f"{name}.npz" if given.is_dir() else given)
     if policy == "learn" and args.save_weights:
         settings["save_weights"] = str(args.save_weights.absolute() / f"{name}.npz")
+        settings["save_every"] = args.save_every
     return settings
 
 
@@ -186,14 +187,17 @@ def play_in_processes(
 ) -> None:
     """Every node its own process; ends when the simulator's does."""
     with Processes(os.environ) as processes:
-        for each in team:
-            processes.start(each.name, [*program(args, each.program), *each.arguments])
+        commands = {each.name: [*program(args, each.program), *each.arguments] for each in team}
+        for name, command in commands.items():
+            processes.start(name, command)
         started = time.monotonic()
         while not told and "simulator" in processes.names:
             executor.spin_once(0.1)
             board.show()
             for name, code in processes.ended():
-                handle_end(args, name, code, board)
+                judge_end(name, code, board)
+                if args.restart and name != "simulator":
+                    processes.start(name, [*commands[name], "-p", "resume:=true"])
             if not board.has_begun and time.monotonic() - started > START_TIMEOUT:
                 raise MatchError(f"nothing began within {START_TIMEOUT:.0f} s: {board.state}")
         processes.stop(["simulator"], END_TIMEOUT)
@@ -203,8 +207,8 @@ def play_in_processes(
         executor.spin_once(0.0)
 
 
-def handle_end(args: argparse.Namespace, name: str, code: int, board: Scoreboard) -> None:
-    """A process has ended by itself."""
+def judge_end(name: str, code: int, board: Scoreboard) -> None:
+    """A process has ended by itself: is it the end of the match, an accident, or a failure?"""
     if name == "simulator":
         if code:
             raise MatchError(f"the simulator ended with code {code}")
@@ -250,8 +254,10 @@ def parse() -> argparse.Namespace:
     add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
     add("--record", default="", metavar="DIR", help="write a bag of everything that is said")
     add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
+    add("--save-every", type=int, default=100, help="and how often, in episodes (default 100)")
     add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")
     add("--resume", action="store_true", help="go on from the weights in --save-weights")
+    add("--restart", action="store_true", help="start players that died again, with their weights")
     add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
     add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")
     add("--single-process", action="store_true", help="all nodes in this process: quicker")

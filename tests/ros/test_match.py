@@ -120,6 +120,23 @@ def test_a_player_that_is_killed_is_named_and_the_match_goes_on() -> None:
     assert summary["troubles"]["keeper_2"]["missed"] > 0
 
 
+def test_a_player_that_is_killed_comes_back_with_what_it_saved(tmp_path: Path) -> None:
+    weights = tmp_path / "keeper_2.npz"
+    arguments = ["--keeper-policy", "learn", "--save-weights", str(tmp_path)]
+    match = start(*arguments, "--save-every", "5", "--restart")
+    wait_for(lambda: "keeper_2" in nodes_of(match) and weights.exists())
+    first = nodes_of(match)["keeper_2"]
+    saved = load_weights(weights).episodes
+    os.kill(first, signal.SIGKILL)
+    wait_for(lambda: nodes_of(match).get("keeper_2", first) != first)
+    wait_for(lambda: load_weights(weights).episodes > saved)
+    match.send_signal(signal.SIGINT)
+    summary, err = finish(match)
+    assert "keeper_2 ended with code -9" in err
+    assert saved < load_weights(weights).episodes < summary["episodes"]
+    assert load_weights(tmp_path / "keeper_1.npz").episodes == summary["episodes"]
+
+
 def test_a_player_that_does_not_come_is_named() -> None:
     match = start("--episodes", "1", "--taker-agent", f"{sys.executable} -c pass")
     summary, err = finish(match)

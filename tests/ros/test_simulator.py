@@ -126,9 +126,13 @@ def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
         if simulator.num_cycles % 10 == 0:
             stranger.publish(lies[simulator.num_cycles // 10 % len(lies)])
 
+    health: list[DiagnosticArray] = []
+    graph.node.create_subscription(DiagnosticArray, "diagnostics", health.append, 10)
     graph.hook = lie
     assert graph.play() == played(trained(2, policy="random"))
     assert simulator.roster.seats[0].rejected > 0
+    graph.spin_until(lambda: bool(health))
+    assert health[-1].status[1].message == "2 nodes answer for it"
 
 
 def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:

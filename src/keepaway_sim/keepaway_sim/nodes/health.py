@@ -9,7 +9,12 @@ from keepaway_sim.roster import Seat
 
 
 def diagnostics(
-    namespace: str, stamp: Time, state: str, figures: dict[str, str], seats: list[Seat]
+    namespace: str,
+    stamp: Time,
+    state: str,
+    figures: dict[str, str],
+    seats: list[Seat],
+    num_answering: list[int],
 ) -> DiagnosticArray:
     """One status for the simulator, and one for every player.
 
@@ -19,6 +24,7 @@ def diagnostics(
         state: of the match, in words.
         figures: of the match, by name.
         seats: the players.
+        num_answering: how many nodes answer for each.
     """
     simulator = DiagnosticStatus(
         level=DiagnosticStatus.OK,
@@ -26,14 +32,19 @@ def diagnostics(
         message=state,
         values=[KeyValue(key=key, value=value) for key, value in figures.items()],
     )
-    array = DiagnosticArray(status=[simulator, *(_of_player(namespace, seat) for seat in seats)])
+    players = (
+        _of_player(namespace, seat, num) for seat, num in zip(seats, num_answering, strict=True)
+    )
+    array = DiagnosticArray(status=[simulator, *players])
     array.header.stamp = stamp
     return array
 
 
-def _of_player(namespace: str, seat: Seat) -> DiagnosticStatus:
+def _of_player(namespace: str, seat: Seat, num_answering: int) -> DiagnosticStatus:
     if not seat.present:
         level, message = DiagnosticStatus.ERROR, "missing"
+    elif num_answering > 1:
+        level, message = DiagnosticStatus.WARN, f"{num_answering} nodes answer for it"
     elif seat.missed or seat.late or seat.rejected:
         level, message = DiagnosticStatus.WARN, "plays, with trouble"
     else:

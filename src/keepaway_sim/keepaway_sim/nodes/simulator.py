@@ -408,7 +408,9 @@ class Simulator(Node):
             "mean_cycles_per_second": f"{self.num_cycles / max(self._time_played, 1e-9):.1f}",
         }
         stamp = self.get_clock().now().to_msg()
-        self._health.publish(diagnostics(self._prefix, stamp, state, figures, self.roster.seats))
+        seats = self.roster.seats
+        answering = [self.count_publishers(f"{seat.name}/action_request") for seat in seats]
+        self._health.publish(diagnostics(self._prefix, stamp, state, figures, seats, answering))
 
 
 def compile_world(task: Task, config: Config) -> None:
