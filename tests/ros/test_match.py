@@ -133,7 +133,8 @@ def test_a_player_that_is_killed_comes_back_with_what_it_saved(tmp_path: Path) -
     match.send_signal(signal.SIGINT)
     summary, err = finish(match)
     assert "keeper_2 ended with code -9" in err
-    assert saved < load_weights(weights).episodes < summary["episodes"]
+    # it may be back before its team-mates have gone on without it
+    assert saved < load_weights(weights).episodes <= summary["episodes"]
     assert load_weights(tmp_path / "keeper_1.npz").episodes == summary["episodes"]
 
 
