@@ -5,19 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from graph import Graph, played, trained
 from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from keepaway_msgs.msg import ActionRequest, Episode, FieldState, Match
+from keepaway_msgs.msg import ActionRequest, AgentStatus, Episode, FieldState, Match
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes import voice
-from keepaway_sim.nodes.voice import LATCHED
+from keepaway_sim.nodes.inbox import Inbox
+from keepaway_sim.nodes.voice import LATCHED, QUEUE
 from keepaway_sim.recording import BagReader
 from keepaway_sim.task import Outcome
 
@@ -133,6 +138,51 @@ def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
     assert simulator.roster.seats[0].rejected > 0
     graph.spin_until(lambda: bool(health))
     assert health[-1].status[1].message == "2 nodes answer for it"
+
+
+def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain: int) -> None:
+    simulator = graph.start_simulator(episodes=2, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    stranger = Node("stranger", context=context)
+    requests = stranger.create_publisher(ActionRequest, "keeper_1/action_request", 10)
+    status = stranger.create_publisher(AgentStatus, "keeper_1/status", LATCHED)
+
+    said: set[tuple[int, int]] = set()
+
+    def meddle() -> None:
+        seen = simulator.world.perceptions
+        moment = int(seen.episode[0]), int(seen.cycle[0])
+        if moment in said:
+            return
+        said.add(moment)
+        now = dict(zip(("episode", "cycle"), moment, strict=True))
+        requests.publish(ActionRequest(action=ActionRequest.HOLD_BALL, **now))
+        if simulator.num_cycles % 10 == 0:
+            status.publish(AgentStatus(name="keeper_1", ready=True, episodes=1000))
+
+    graph.play(until=lambda: simulator.num_cycles >= 1)
+    graph.hook = meddle
+    assert graph.play() == played(trained(2, policy="random"))
+    assert simulator.roster.seats[0].rejected > 10
+    stranger.destroy_node()
+    context.shutdown()
+
+
+def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
+    heard: list[tuple[bytes, bytes]] = []
+    inbox = Inbox(graph.node, Episode, "told", lambda *one: heard.append(one), QUEUE)
+    publisher = graph.node.create_publisher(Episode, "told", QUEUE)
+    numbers = [1, 3]
+    for number in numbers:
+        publisher.publish(Episode(number=number))
+    graph.spin_until(lambda: len(heard) == 2)
+    known = graph.node.get_publishers_info_by_topic("told")[0].endpoint_gid
+    assert {gid for _, gid in heard} == {bytes(known)}
+    assert [deserialize_message(data, Episode).number for data, _ in heard] == numbers
+    graph.node.remove_waitable(inbox)
+    inbox.destroy()
 
 
 def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:

@@ -171,6 +171,25 @@ def test_what_no_player_may_send_is_counted_and_moves_nobody(roster, data, why):
     assert roster.requests()[0][0, KEEPER] == Action.GET_OPEN
 
 
+def test_a_seat_is_its_holders_until_that_is_missing(world, roster):
+    roster.seats[KEEPER].holder = b"first"
+    request = answer(KEEPER, action=Action.PASS_BALL, target=MATE)
+    for claim in (
+        lambda: roster.take(KEEPER, request, b"second"),
+        lambda: roster.welcome(KEEPER, b"second"),
+    ):
+        with pytest.raises(KeepawayError, match="another process plays keeper_1"):
+            claim()
+    assert (roster.num_awaited, roster.seats[KEEPER].rejected) == (5, 1)
+    roster.dismiss(TIMEOUT, TIMEOUT)
+    roster.take(KEEPER, request, b"second")
+    with pytest.raises(KeepawayError, match="another process plays keeper_1"):
+        roster.take(KEEPER, request, b"first")
+    next_cycle(world, roster, now=3.0)
+    assert new_episode(world, roster, now=3.0) == ["keeper_1"]
+    assert roster.seats[KEEPER].holder == b"second"
+
+
 def test_a_target_that_does_not_matter_may_be_anything(roster):
     roster.take(KEEPER, answer(KEEPER, action=Action.GO_TO_BALL, target=255))
     assert roster.num_awaited == 4

@@ -35,6 +35,7 @@ class Seat:
     """
 
     name: str
+    holder: bytes = b""  # the process that plays it; nobody's while absent and not returning
     present: bool = False  # is waited for
     returning: bool = False  # absent, but has spoken: present from the next kick-off on
     data: bytes = b""  # this cycle's answer, empty while there is none
@@ -74,9 +75,19 @@ class Roster:
         """Is nobody there, and nobody coming?"""
         return not any(seat.present or seat.returning for seat in self.seats)
 
-    def welcome(self, player: int) -> None:
-        """A player says that it is ready: before the match it is present, later it returns."""
+    def welcome(self, player: int, sender: bytes = b"") -> None:
+        """A player says that it is ready: before the match it is present, later it returns.
+
+        Args:
+            player: its index.
+            sender: the process that says so.
+
+        Raises:
+            KeepawayError: another process plays it.
+        """
         seat = self.seats[player]
+        _check_holder(seat, sender)
+        seat.holder = sender
         seat.present = seat.present or self._episode < 0
         seat.returning = not seat.present
 
@@ -100,22 +111,24 @@ class Roster:
                 seat.waiting_since = min(seat.waiting_since, now)
         return back
 
-    def take(self, player: int, data: bytes) -> None:
-        """Take an ActionRequest's bytes that came on a player's topic.
+    def take(self, player: int, data: bytes, sender: bytes = b"") -> None:
+        """Take an ActionRequest's bytes that came on a player's topic from a process.
 
         An answer to this cycle's perception is this player's move. A late one is not, but in
         this episode it holds where a later answer does not come in time.
 
         Raises:
-            KeepawayError: it is not a request, or not one that this player may make now; it is
-                counted, and nothing else comes of it.
+            KeepawayError: it is not a request, not one that this player may make now, or another
+                process plays the player; it is counted, and nothing else comes of it.
         """
         seat = self.seats[player]
         try:
+            _check_holder(seat, sender)
             request = self._checked(player, data)
         except KeepawayError:
             seat.rejected += 1
             raise
+        seat.holder = sender
         seat.returning = not seat.present
         if (request.episode, request.cycle) != (self._episode, self._cycle):
             self._take_late(seat, request)
@@ -201,6 +214,11 @@ class Roster:
         if self._task.role(player) == Role.TAKER:
             return Action.GO_TO_BALL
         return Action.HOLD_BALL if self._kickable[player] else Action.GET_OPEN
+
+
+def _check_holder(seat: Seat, sender: bytes) -> None:
+    if (seat.present or seat.returning) and sender != seat.holder:
+        raise KeepawayError(f"another process plays {seat.name}")
 
 
 def checked_request(data: bytes) -> Request:

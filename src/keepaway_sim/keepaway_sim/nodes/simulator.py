@@ -37,6 +37,7 @@ from keepaway_sim.episodes import world_info
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import FieldMessages
 from keepaway_sim.nodes.health import diagnostics
+from keepaway_sim.nodes.inbox import PROCESS_SIZE, Inbox
 from keepaway_sim.nodes.raw import declared
 from keepaway_sim.nodes.voice import LATCHED, QUEUE, Voice
 from keepaway_sim.recording import BagWriter
@@ -150,6 +151,12 @@ class Simulator(Node):
             self._time_played += time.monotonic() - began
         self._say_farewell()
 
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+        for inbox in self._inboxes:
+            inbox.destroy()
+        super().destroy_node()
+
     def close(self) -> None:
         """Finish the bag."""
         if self._bag is not None:
@@ -178,13 +185,14 @@ class Simulator(Node):
         return bag
 
     def _listen(self) -> None:
-        for player, seat in enumerate(self.roster.seats):
+        self._inboxes = [
+            Inbox(self, message, f"{seat.name}/{topic}", partial(callback, player), qos)
+            for player, seat in enumerate(self.roster.seats)
             for topic, message, callback, qos in (
                 ("action_request", ActionRequest, self._on_request, QUEUE),
                 ("status", AgentStatus, self._on_status, LATCHED),
-            ):
-                hear = partial(callback, player)
-                self.create_subscription(message, f"{seat.name}/{topic}", hear, qos, raw=True)
+            )
+        ]
         for name, serve in (
             ("start", self._on_start),
             ("pause", self._on_pause),
@@ -198,29 +206,34 @@ class Simulator(Node):
 
     # What others say.
 
-    def _on_request(self, player: int, data: bytes) -> None:
+    def _on_request(self, player: int, data: bytes, gid: bytes) -> None:
         try:
-            self.roster.take(player, data)
+            self.roster.take(player, data, gid[:PROCESS_SIZE])
         except KeepawayError as error:
-            seen, name = self.world.perceptions, self.roster.seats[player].name
-            self.get_logger().warning(
-                f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}",
-                throttle_duration_sec=LOG_PERIOD,
-            )
+            self._say_rejected(player, error)
 
-    def _on_status(self, player: int, data: bytes) -> None:
-        name = self.roster.seats[player].name
+    def _on_status(self, player: int, data: bytes, gid: bytes) -> None:
+        seat = self.roster.seats[player]
+        was_there = seat.present or seat.returning
         try:
-            status = codec(messages.AGENT_STATUS).decode(data)
+            status = read_status(data, player, seat.name)
+            if status is None:
+                return
+            self.roster.welcome(player, gid[:PROCESS_SIZE])
         except KeepawayError as error:
-            self.get_logger().warning(f"{name}: {error}", throttle_duration_sec=LOG_PERIOD)
-            return
-        if not status["ready"] or (status["player_index"], status["name"]) != (player, name):
+            seat.rejected += 1
+            self._say_rejected(player, error)
             return
         self._statuses[player] = {**status, "data": data}
-        if not self.roster.seats[player].present:
-            self.roster.welcome(player)
-            self.get_logger().info(f"{name} is ready: {status['policy']}")
+        if not was_there:
+            self.get_logger().info(f"{seat.name} is ready: {status['policy']}")
+
+    def _say_rejected(self, player: int, error: KeepawayError) -> None:
+        seen, name = self.world.perceptions, self.roster.seats[player].name
+        self.get_logger().warning(
+            f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}",
+            throttle_duration_sec=LOG_PERIOD,
+        )
 
     def _on_recorded(self, time_: Time) -> None:
         self._recorded = time_.sec * messages.SECOND + time_.nanosec
@@ -411,6 +424,20 @@ class Simulator(Node):
         seats = self.roster.seats
         answering = [self.count_publishers(f"{seat.name}/action_request") for seat in seats]
         self._health.publish(diagnostics(self._prefix, stamp, state, figures, seats, answering))
+
+
+def read_status(data: bytes, player: int, name: str) -> dict[str, Any] | None:
+    """What an AgentStatus's bytes say; None of a player that is not ready.
+
+    Raises:
+        KeepawayError: bytes that are no AgentStatus, or one of another player.
+    """
+    status = codec(messages.AGENT_STATUS).decode(data)
+    if not status["ready"]:
+        return None
+    if (status["player_index"], status["name"]) != (player, name):
+        raise KeepawayError(f"the status of {status['name']!r}, player {status['player_index']}")
+    return status
 
 
 def compile_world(task: Task, config: Config) -> None:
