@@ -5,9 +5,11 @@
     .venv/bin/python scripts/train.py --policy hand --episodes 2000 --json
     .venv/bin/python scripts/train.py --policy greedy --load-weights out/3v2 --episodes 2000
     .venv/bin/python scripts/train.py --taker-policy learn --policy hand --save-weights out/takers
+    .venv/bin/python scripts/train.py --episodes 8000 --record out/bag --record-episodes 0-9,7999
 
 Ctrl-C stops it with all finished trials saved; the same command goes on from there. With --json the
-last line of the output is one JSON object.
+last line of the output is one JSON object. --record makes a bag, like a match's, of the first
+trial.
 """
 
 import argparse
@@ -26,11 +28,12 @@ from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.trainer import Progress
-from keepaway_agent.training import NUM_FIELDS, Training, TrainingFolder, play
+from keepaway_agent.training import NUM_FIELDS, RECORDED_TRIAL, Training, TrainingFolder, play
+from keepaway_agent.trial_recorder import TrialRecorder
 from keepaway_agent.weights import HOURS_PER_CYCLE
 from keepaway_sim.config import CYCLE_TIME
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.options import add_options
+from keepaway_sim.options import add_options, numbers_in
 from keepaway_sim.scores import Score, summary
 from keepaway_sim.task import Outcome
 
@@ -55,9 +58,9 @@ def main() -> int:
         )
         numbers = range(arguments.trials)
         episodes: Episodes = {k: folder.episodes(k) for k in folder.done} if folder else {}
-        rate = train(
-            training, [k for k in numbers if k not in episodes], arguments, folder, episodes
-        )
+        missing = [k for k in numbers if k not in episodes]
+        recorder = recorder_of(training, missing, command, arguments)
+        rate = train(training, missing, arguments, folder, episodes, recorder)
     except (AgentError, KeepawayError, OSError) as error:
         print(f"train: {error}", file=sys.stderr)
         return 1
@@ -69,12 +72,33 @@ def main() -> int:
     return 0
 
 
+def recorder_of(
+    training: Training, missing: list[int], command: str, arguments: argparse.Namespace
+) -> TrialRecorder | None:
+    """What records the first trial, if that is asked for.
+
+    Raises:
+        AgentError: the trial is there already, so it is not played again.
+        KeepawayError: numbers that are none.
+    """
+    if not arguments.record:
+        return None
+    if RECORDED_TRIAL not in missing:
+        raise AgentError(
+            f"--record {arguments.record}: trial {RECORDED_TRIAL} is in {arguments.save_weights}"
+            " already and is not played again; name another folder for the weights"
+        )
+    chosen = numbers_in(arguments.record_episodes) if arguments.record_episodes else None
+    return training.recorder(arguments.record, chosen, command)
+
+
 def train(
     training: Training,
     numbers: list[int],
     arguments: argparse.Namespace,
     folder: TrainingFolder | None,
     episodes: Episodes,
+    recorder: TrialRecorder | None,
 ) -> float | None:
     """Play the trials that are missing; Ctrl-C ends it early.
 
@@ -91,7 +115,8 @@ def train(
             bar.set_postfix_str(str(meter))
 
         try:
-            for result in play(training, numbers, arguments.processes, arguments.fields, watch):
+            spread = arguments.processes, arguments.fields
+            for result in play(training, numbers, *spread, watch, recorder):
                 if folder:
                     folder.save(result)
                 episodes[result.trial.label] = result.durations, result.outcomes
@@ -177,6 +202,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--save-weights", type=Path, metavar="DIR", help="folder of the results")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="to spread over")
     parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="side by side in a process")
+    parser.add_argument("--record", type=Path, metavar="BAG", help="of the first trial")
+    parser.add_argument("--record-episodes", metavar="NUMBERS", help="only these, like 0-9,500")
     parser.add_argument("--any-code", action="store_true", help="go on though the code has changed")
     parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
     add_options(parser, Training)

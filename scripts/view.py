@@ -24,7 +24,8 @@ from keepaway_sim.episodes import MatchBag, with_markers
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.live import Server
 from keepaway_sim.nodes.spectator import Spectator
-from keepaway_sim.viewer import numbers_in, picture, replay_page
+from keepaway_sim.options import numbers_in
+from keepaway_sim.viewer import picture, replay_page
 
 LAYOUT = Path(__file__).resolve().parents[1] / "src/keepaway_sim/foxglove/keepaway.json"
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from keepaway_sim.options import add_options, parse_node_arguments, ros_arguments
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.options import add_options, numbers_in, parse_node_arguments, ros_arguments
 
 
 @dataclass
@@ -52,3 +53,9 @@ def test_what_is_no_option_or_value_is_refused(parser, wrong, capsys):
 
 def test_texts_that_look_like_numbers_stay_texts():
     assert ros_arguments({"profile": "2005"})[-1] == 'profile:="2005"'
+
+
+@pytest.mark.parametrize("text", ["", "x", "3-", "1;2"])
+def test_numbers_that_are_none_are_refused(text):
+    with pytest.raises(KeepawayError, match="write numbers like"):
+        numbers_in(text)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -92,6 +92,16 @@ class StopRule:
                 raise AgentError(f"{name}={value}: give a positive number")
 
 
+class Moment(NamedTuple):
+    """A cycle of a trial that is watched: all have answered, and the world has not gone on yet."""
+
+    world: World
+    field: int  # of the world, on which the trial is played
+    action: np.ndarray  # (num_players,) int64, what everybody asks for where a decision is due
+    target: np.ndarray  # (num_players,) int64
+    values: list[np.ndarray]  # what each player's learner expected; empty where none was asked
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """One team's life.
@@ -108,6 +118,7 @@ class Trial:
     taker_weights: np.ndarray | None = None
     snapshots: tuple[int, ...] = ()  # numbers of episodes after which keepers' weights are kept
     label: Any = None  # whatever its owner knows it by
+    watch: Callable[[Moment], None] | None = None  # is shown every cycle
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +181,7 @@ class Trainer:
         self._order = np.zeros(task.num_players, dtype=np.int64)
         self._lives: list[_Life | None] = [None] * num_fields
         self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
+        self._watched: set[int] = set()  # fields whose trial has a `watch`
 
     def run(
         self,
@@ -213,6 +225,7 @@ class Trainer:
     def _start_next(self, number: int, waiting: Iterator[Trial]) -> None:
         """Give a field to the next trial, and kick off; let it rest if there is none."""
         trial = next(waiting, None)
+        self._watched.discard(number)
         if trial is None:
             self._world.stop(number)
             return
@@ -227,6 +240,8 @@ class Trainer:
         self._lives[number] = _Life(trial)
         self._cycles_left[number] = trial.stop.max_cycles or _ENDLESS
         self._world.start(number, _child(trial.seed, 0))
+        if trial.watch:
+            self._watched.add(number)
 
     def _fields_at_an_end(self) -> list[int]:
         """Fields whose episode is over, or whose trial has used up its cycles."""
@@ -269,6 +284,7 @@ class Trainer:
     def _decide(self, first: int, last: int) -> None:
         """Let players of fields first..last-1 answer, and pay those whose episode is over."""
         self._streams.refill()
+        unused = self._streams.cursor.copy()
         decide_all(
             first,
             last,
@@ -284,6 +300,20 @@ class Trainer:
             self._action,
             self._target,
         )
+        for number in self._watched.intersection(range(first, last)):
+            self._show(number, unused)
+
+    def _show(self, number: int, unused: np.ndarray) -> None:
+        """Show a trial's moment; whoever chose has used up numbers of its stream since `unused`."""
+        life, task = self._lives[number], self.config.task
+        assert life is not None
+        assert life.trial.watch is not None
+        streams = slice(number * task.num_players, (number + 1) * task.num_players)
+        chose = self._streams.cursor[streams] != unused[streams]
+        keepers = self._teams[Role.KEEPER].expected(number, chose[: task.num_keepers])
+        takers = self._teams[Role.TAKER].expected(number, chose[task.num_keepers :])
+        asked = self._action[number], self._target[number]
+        life.trial.watch(Moment(self._world, number, *asked, keepers + takers))
 
 
 _IN_PLAY: Final = int(Outcome.IN_PLAY)
@@ -310,6 +340,7 @@ class _Team:
             config.sarsa,
             self._size if keeps and config.shared else 1,
         )
+        self._has_learners = np.zeros(num_fields, dtype=np.bool_)
         first = 0 if keeps else task.num_keepers
         self.player = make_player(
             first, task.num_keepers, "learn", config.ordering, config.decision_interval
@@ -324,6 +355,7 @@ class _Team:
         rows = self._rows(number)
         for i in rows:
             sarsa.forget(self.learners, i)
+        self._has_learners[number] = policy in _LEARNED
         if policy not in _LEARNED:
             return
         shape = (self._size, *sarsa.tiles_of(self.learners, 0).shape)
@@ -336,6 +368,14 @@ class _Team:
     def weights(self, number: int) -> np.ndarray:
         """What the team on a field has learned, (num_players, num_actions, ..), a copy."""
         return np.stack([sarsa.tiles_of(self.learners, i) for i in self._rows(number)])
+
+    def expected(self, number: int, chose: np.ndarray) -> list[np.ndarray]:
+        """What each player's learner expected of its choices; empty where none has just chosen."""
+        values, asked = self.learners.values, chose & self._has_learners[number]
+        return [
+            values[i].copy() if known else values[i, :0]
+            for i, known in zip(self._rows(number), asked, strict=True)
+        ]
 
     def _rows(self, number: int) -> range:
         return range(number * self._size, (number + 1) * self._size)

@@ -9,7 +9,9 @@ players of the first trial learned lies in the folder itself too, for whoever ne
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import io
 import json
 import math
 import multiprocessing
@@ -17,7 +19,7 @@ import os
 import queue
 import shutil
 import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -25,6 +27,7 @@ from typing import Any, Final
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
+from keepaway_agent.agent import AgentConfig
 from keepaway_agent.errors import AgentError
 from keepaway_agent.policies import TAKER_DECISION_INTERVAL, make_player
 from keepaway_agent.sarsa import SarsaConfig
@@ -37,12 +40,14 @@ from keepaway_agent.trainer import (
     TrialResult,
     trial_seed,
 )
+from keepaway_agent.trial_recorder import TrialRecorder
 from keepaway_agent.weights import (
     HOURS_PER_CYCLE,
     LearnedWeights,
     check_fits,
     load_weights,
     save_weights,
+    write_weights,
 )
 from keepaway_sim import config as world_config
 from keepaway_sim.task import Task
@@ -50,6 +55,8 @@ from keepaway_sim.version import code_version
 
 NUM_FIELDS: Final = 64
 """Fields played in lock-step by one process."""
+RECORDED_TRIAL: Final = 0
+"""The trial that can be recorded: it is the same as a match of ROS nodes with the seed."""
 FORMAT: Final = "keepaway-training"
 FORMAT_VERSION: Final = 1
 
@@ -131,7 +138,9 @@ class Training:
             check_fits(each, Role.KEEPER, *teams, tiling, self.ordering)
         return weights
 
-    def trial(self, number: int, weights: np.ndarray | None) -> Trial:
+    def trial(
+        self, number: int, weights: np.ndarray | None, recorder: TrialRecorder | None = None
+    ) -> Trial:
         """Trial `number`, its keepers starting from (num_keepers, ..) weights."""
         return Trial(
             seed=trial_seed(self.seed, number),
@@ -140,7 +149,33 @@ class Training:
             taker_policy=self.taker_policy,
             keeper_weights=weights,
             label=number,
+            watch=recorder if number == RECORDED_TRIAL else None,
         )
+
+    def recorder(
+        self, path: Path, episodes: Collection[int] | None = None, command: str = ""
+    ) -> TrialRecorder:
+        """What records RECORDED_TRIAL to `path`; only these episodes, or all.
+
+        Raises:
+            WeightsError: as in `start`.
+        """
+        names = self.trainer.task.player_names
+        info = {"command": command}
+        if not self.shared:  # no player that learns alone could be checked against those
+            info["agents"] = json.dumps(dict(zip(names, self._agents(), strict=True)))
+        starts = zip(names, self.start(), strict=False)
+        files = {f"{name}.npz": _weights_bytes(weights) for name, weights in starts}
+        wanted = None if episodes is None else frozenset(episodes).__contains__
+        return TrialRecorder(path, self.seed, wanted, info, files)
+
+    def _agents(self) -> list[dict[str, Any]]:
+        """How each player plays, as the fields of AgentConfig."""
+        own = [entry.name for entry in dataclasses.fields(AgentConfig) if hasattr(self, entry.name)]
+        settings = {name: getattr(self, name) for name in own}
+        task = self.trainer.task
+        takers = settings | {"policy": self.taker_policy}
+        return [settings] * task.num_keepers + [takers] * task.num_takers
 
 
 def play(
@@ -149,6 +184,7 @@ def play(
     processes: int = 1,
     num_fields: int = NUM_FIELDS,
     watch: Callable[[Progress], None] | None = None,
+    recorder: TrialRecorder | None = None,
 ) -> Generator[TrialResult, None, None]:
     """Play trials, and give each one's result as soon as it is over; `label` is its number.
 
@@ -158,21 +194,25 @@ def play(
         processes: over how many processes they are spread; results do not depend on it.
         num_fields: trials that a process plays side by side.
         watch: is told of the progress several times a second.
+        recorder: records RECORDED_TRIAL, if that is among the numbers; see `Training.recorder`.
 
     Raises:
         AgentError: a training that cannot be played, or a process that died.
+        KeepawayError: something is in the place of the bag.
     """
     processes = max(1, min(processes, len(numbers)))
     num_fields = max(1, min(num_fields, math.ceil(len(numbers) / processes)))
     if processes == 1:
-        yield from _play_here(training, iter(numbers), num_fields, watch)
+        yield from _play_here(training, iter(numbers), num_fields, watch, recorder)
         return
     context = multiprocessing.get_context("spawn")
     said: multiprocessing.Queue[Any] = context.Queue()
     taken = context.Value("q", 0)
     workers = [
         context.Process(
-            target=_work, args=(training, numbers, taken, num_fields, said, place), daemon=True
+            target=_work,
+            args=(training, numbers, taken, num_fields, said, place, recorder),
+            daemon=True,
         )
         for place in range(processes)
     ]
@@ -192,15 +232,26 @@ def _play_here(
     numbers: Iterator[int],
     num_fields: int,
     watch: Callable[[Progress], None] | None,
+    recorder: TrialRecorder | None,
 ) -> Generator[TrialResult, None, None]:
     loaded = training.start()
     weights = np.stack([each.values for each in loaded]) if loaded else None
-    trials = (training.trial(number, weights) for number in numbers)
-    yield from Trainer(training.trainer, num_fields).run(trials, watch)
+    trials = (training.trial(number, weights, recorder) for number in numbers)
+    with contextlib.closing(recorder) if recorder else contextlib.nullcontext():
+        for result in Trainer(training.trainer, num_fields).run(trials, watch):
+            if recorder and result.trial.label == RECORDED_TRIAL:
+                recorder.close()
+            yield dataclasses.replace(result, trial=dataclasses.replace(result.trial, watch=None))
 
 
 def _work(
-    training: Training, numbers: Sequence[int], taken: Any, num_fields: int, said: Any, place: int
+    training: Training,
+    numbers: Sequence[int],
+    taken: Any,
+    num_fields: int,
+    said: Any,
+    place: int,
+    recorder: TrialRecorder | None,
 ) -> None:
     """A process: play one trial after the other of those that nobody has taken yet."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
@@ -217,7 +268,7 @@ def _work(
         said.put((place, dataclasses.replace(news)))  # a copy: it is sent a little later
 
     try:
-        for result in _play_here(training, next_numbers(), num_fields, tell):
+        for result in _play_here(training, next_numbers(), num_fields, tell, recorder):
             tell(result)
     except ValueError as error:
         said.put((place, error))
@@ -354,6 +405,12 @@ class TrainingFolder:
                 code_version=code_version(),
                 created_by=self._command,
             )
+
+
+def _weights_bytes(weights: LearnedWeights) -> bytes:
+    file = io.BytesIO()
+    write_weights(file, weights)
+    return file.getvalue()
 
 
 def _episodes_text(result: TrialResult) -> str:

@@ -9,6 +9,8 @@ import json
 import re
 from collections.abc import Collection, Mapping, Sequence
 
+from keepaway_sim.errors import KeepawayError
+
 _COMMENTED_FIELD = re.compile(r"^ {4}(\w+): .*?#\s*(.+)$", re.MULTILINE)
 
 
@@ -71,6 +73,24 @@ def ros_arguments(
     for parameter, value in parameters.items():
         arguments += ["-p", f"{parameter}:={json.dumps(value)}"]
     return arguments
+
+
+def numbers_in(text: str) -> set[int]:
+    """The numbers in "7", "3-9" or "0,5,10-12".
+
+    Raises:
+        KeepawayError: anything else.
+
+    >>> sorted(numbers_in("0,5,10-12"))
+    [0, 5, 10, 11, 12]
+    """
+    numbers: set[int] = set()
+    for part in text.split(","):
+        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        if not found:
+            raise KeepawayError(f"{text!r}: write numbers like 7 or 3-9 or 0,5,10-12")
+        numbers |= set(range(int(found[1]), int(found[2] or found[1]) + 1))
+    return numbers
 
 
 def _truth(word: str) -> bool:

@@ -11,7 +11,6 @@ import functools
 import html
 import json
 import math
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -306,24 +305,6 @@ def _caption(track: Track, row: int) -> str:
     outcome = Outcome(int(track.outcome[row]))
     words = "" if outcome == Outcome.IN_PLAY else f", {outcome.name.lower().replace('_', ' ')}"
     return f"{seconds:.1f} s{words}"
-
-
-def numbers_in(text: str) -> set[int]:
-    """The numbers in "7", "3-9" or "0,5,10-12".
-
-    Raises:
-        KeepawayError: anything else.
-
-    >>> sorted(numbers_in("0,5,10-12"))
-    [0, 5, 10, 11, 12]
-    """
-    numbers: set[int] = set()
-    for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
-        if not found:
-            raise KeepawayError(f"{text!r}: write numbers like 7 or 3-9 or 0,5,10-12")
-        numbers |= set(range(int(found[1]), int(found[2] or found[1]) + 1))
-    return numbers
 
 
 def pass_moments(track: Track) -> Iterable[int]:
