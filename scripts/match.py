@@ -4,6 +4,7 @@
     .venv/bin/python scripts/match.py --speed 1 --keeper-policy hand --record out/bag
     .venv/bin/python scripts/match.py --keeper-policy greedy --load-weights out/weights --json
     .venv/bin/python scripts/match.py --episodes 20 --keeper-agent "python my_keeper.py"
+    .venv/bin/python scripts/match.py --episodes 20 --agent keeper_2=my_keeper.py
 
 Ctrl-C ends it with weights and bag whole. Give a second match on this machine another --domain or
 --namespace. With --json the last line of the output is one JSON object.
@@ -66,6 +67,7 @@ def main() -> int:
     executor = EventsExecutor()
     try:
         task = Task.parse(args.task, args.field)
+        seat_agents(args, task)
         check_files(args)
         board = Scoreboard(args.episodes, namespace=args.namespace)
         executor.add_node(board)
@@ -81,6 +83,30 @@ def main() -> int:
     return 130 if told else 0
 
 
+def seat_agents(args: argparse.Namespace, task: Task) -> None:
+    """Let `args.agent` say of every player that is not ours by which command it is started.
+
+    Raises:
+        MatchError: without a command, of a player whom the match has not, or in one process with
+            ours.
+    """
+    single = dict(each.partition("=")[::2] for each in args.agent)
+    for name in (*single, *args.elsewhere):
+        if name not in task.player_names:
+            raise MatchError(
+                f"{name!r} does not play: {task.name} has {', '.join(task.player_names)}"
+            )
+        if not single.get(name, "elsewhere").strip():
+            raise MatchError(f"--agent {name}: give NAME=COMMAND")
+    teams = {
+        name: getattr(args, f"{task.role(p).name.lower()}_agent")
+        for p, name in enumerate(task.player_names)
+    }
+    args.agent = {name: command for name, command in (teams | single).items() if command}
+    if (args.agent or args.elsewhere) and args.single_process:
+        raise MatchError("--single-process plays with our own players only")
+
+
 def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
     own = {"task", "field", "seed", "speed", "episodes", "profile", "visible_angle", "record"}
@@ -88,7 +114,12 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
     players = {
         name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
     }
-    agents = {name: {"policy": player["policy"]} for name, player in players.items()}
+    agents = {
+        name: {"policy": "agent", "command": args.agent[name]}
+        if name in args.agent
+        else {"policy": player["policy"]}
+        for name, player in players.items()
+    }
     info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents)}
     settings["record_info"] = json.dumps(info)
     settings["record_attachments"] = json.dumps(weights_at_start(players))
@@ -187,7 +218,11 @@ def play_in_processes(
 ) -> None:
     """Every node its own process; ends when the simulator's does."""
     with Processes(os.environ) as processes:
-        commands = {each.name: [*program(args, each.program), *each.arguments] for each in team}
+        commands = {
+            each.name: [*program(args, each), *each.arguments]
+            for each in team
+            if each.name not in args.elsewhere
+        }
         for name, command in commands.items():
             processes.start(name, command)
         started = time.monotonic()
@@ -218,12 +253,11 @@ def judge_end(name: str, code: int, board: Scoreboard) -> None:
         print(f"match: {name} ended with code {code}; it is missing now", file=sys.stderr)
 
 
-def program(args: argparse.Namespace, name: str) -> list[str]:
-    """The command that starts a node of this kind."""
-    own = getattr(args, f"{name}_agent", None)
-    if not own:
-        return [sys.executable, str(SCRIPTS / f"{name}.py")]
-    words = shlex.split(own)
+def program(args: argparse.Namespace, member: Member) -> list[str]:
+    """The command that starts a node."""
+    if member.name not in args.agent:
+        return [sys.executable, str(SCRIPTS / f"{member.program}.py")]
+    words = shlex.split(args.agent[member.name])
     return [sys.executable, *words] if words[0].endswith(".py") else words
 
 
@@ -260,6 +294,8 @@ def parse() -> argparse.Namespace:
     add("--restart", action="store_true", help="start players that died again, with their weights")
     add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
     add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")
+    add("--agent", action="append", default=[], metavar="NAME=COMMAND", help="for one player")
+    add("--elsewhere", action="append", default=[], metavar="NAME", help="started by others")
     add("--single-process", action="store_true", help="all nodes in this process: quicker")
     add("--namespace", default="", help="of all nodes and topics, like /match_2")
     add("--domain", type=int, help="ROS domain (default: that of the environment)")

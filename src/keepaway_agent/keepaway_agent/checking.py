@@ -29,7 +29,7 @@ def check_decisions(bag: MatchBag) -> Checked:
     episodes = compared = 0
     for episode, track in whole_episodes(bag):
         for row in range(len(track.time)):
-            for player, agent in enumerate(agents):
+            for player, agent in agents.items():
                 decision = agent.perceive(_perceived(track, row, player, episode.number))
                 what = _difference(track, row, player, decision)
                 if what:
@@ -41,8 +41,8 @@ def check_decisions(bag: MatchBag) -> Checked:
     return Checked(episodes, compared, None)
 
 
-def recorded_agents(bag: MatchBag) -> list[Agent]:
-    """The players of a bag as they were when the match began.
+def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
+    """The players of a bag as they were when the match began, by index; strangers are left out.
 
     Raises:
         KeepawayError: the bag does not say who played.
@@ -60,12 +60,13 @@ def recorded_agents(bag: MatchBag) -> list[Agent]:
         cycle_time=match["cycle_time"],
         seed=match["seed"],
     )
-    agents = []
+    agents = {}
     for player, name in enumerate(match["player_names"]):
-        agent = Agent(facts, player, AgentConfig(**told.get(name, {})))
+        if "command" in told.get(name, {}):
+            continue
+        agents[player] = agent = Agent(facts, player, AgentConfig(**told.get(name, {})))
         if f"{name}.npz" in files:
             agent.use(read_weights(io.BytesIO(files[f"{name}.npz"])))
-        agents.append(agent)
     return agents
 
 
