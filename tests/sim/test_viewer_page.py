@@ -182,6 +182,21 @@ def test_it_shows_what_the_learner_expected_and_what_was_chosen(
     assert chosen[0].startswith("hold" if action == 0 else f"pass to K{target + 1}")
 
 
+def test_the_last_choice_stays_until_there_is_a_new_one(
+    page: Browser, bag: MatchBag, episodes: list[EpisodeSummary]
+) -> None:
+    asked = np.isfinite(bag.track(episodes[0]).values[:, :3, 0])
+    chose, keeper = np.argwhere(asked[:-1] & ~asked[1:])[0].tolist()
+    page.value(f"choosePlayer({keeper}); seek({chose})")
+    now = page.value("[...document.querySelectorAll('.value')].map(e => e.textContent)")
+    page.value(f"seek({chose + 1})")
+    assert page.value("[...document.querySelectorAll('.past')].map(e => e.textContent)") == now
+    assert "last chose, 0.1 s ago" in text(page, "#mind")
+    page.value("seek(0)")
+    if not asked[0, keeper]:
+        assert "No learner has chosen for it yet" in text(page, "#mind")
+
+
 def test_it_tells_how_far_a_players_belief_is_off(
     page: Browser, bag: MatchBag, episodes: list[EpisodeSummary]
 ) -> None:
@@ -228,6 +243,13 @@ def test_a_click_on_the_field_chooses_the_player_there(
     size = 25 + 2 * 1.6
     page.click("#field", across=0.5 + place[0] / size, down=0.5 - place[1] / size)
     assert page.value("view.player") == 2
+
+
+@pytest.mark.parametrize(("width", "height"), [(1024, 768), (1366, 768), (1920, 1080)])
+def test_nobody_scrolls_on_a_wide_screen(page: Browser, width: int, height: int) -> None:
+    page.resize(width, height)
+    page.value(PICTURE)
+    assert page.value("document.documentElement.scrollHeight") <= height
 
 
 @pytest.mark.parametrize(

@@ -238,7 +238,7 @@ function drawBelief() {
     pen.globalAlpha = age > KNOWN_AGE ? 0.35 : 1 - 0.04 * age;
     line(place(object), thought, colour, 0.05 * scale, [0.12 * scale, 0.12 * scale]);
     disc(thought, object === ballIndex() ? 0.75 * r : 1.05 * r, null, colour, 0.22 * r);
-    if (age > 0) {
+    if (age > 1) { // everybody's last look is up to a cycle old
       const [x, y] = px(thought);
       pen.font = `${Math.round(1.05 * r)}px system-ui, sans-serif`;
       pen.textAlign = "left";
@@ -309,17 +309,25 @@ function tellMind(frame) {
   }
   const asked = doing(frame, me);
   mind.append(paragraph(`${match.names[me].replace("_", " ")} ${inWords(asked)}${asked.fresh ? "" : " (as before)"}.`));
-  const values = [];
-  for (let k = 0; k < match.num_keepers; k += 1) values.push(field(frame, "values", me * match.num_keepers + k));
-  if (values.every((value) => value === NONE)) {
-    mind.append(paragraph(isKeeper(me) ? "No learner was asked: it has no ball, or no learner." : "No learner was asked.", "quiet"));
-  } else tellValues(frame, me, asked, values);
+  const chose = lastChoice(me);
+  if (chose) tellValues(chose, me, seconds(frame) - seconds(chose));
+  else mind.append(paragraph(`No learner has chosen for it yet${isKeeper(me) ? "; without the ball a keeper has no choice" : ""}.`, "quiet"));
   const off = objectsOff(frame, me);
   if (off) mind.append(paragraph(off, "quiet"));
 }
 
-/** The learner's values as bars, the one that was chosen marked. */
-function tellValues(frame, me, asked, values) {
+/** The latest frame up to now in which a player's learner chose; null if there is none. */
+function lastChoice(me) {
+  const { frames } = current();
+  let k = Math.min(Math.floor(view.frame + 1e-6), lastFrame());
+  while (k >= 0 && field(frames[k], "values", me * match.num_keepers) === NONE) k -= 1;
+  return frames[k] ?? null;
+}
+
+/** The learner's values as bars, the one that was chosen marked; pale if that was some seconds ago. */
+function tellValues(frame, me, ago) {
+  const asked = doing(frame, me), values = [];
+  for (let k = 0; k < match.num_keepers; k += 1) values.push(field(frame, "values", me * match.num_keepers + k));
   const ranked = rankedKeepers(frame, me);
   const names = isKeeper(me)
     ? ["hold", ...ranked.map((k) => `pass to ${nick(k)}`)]
@@ -330,13 +338,14 @@ function tellValues(frame, me, asked, values) {
   values.forEach((value, k) => {
     if (value === NONE || k >= names.length) return;
     const row = document.createElement("div"), bar = document.createElement("i"), number = document.createElement("b");
-    row.className = "value" + (asked.fresh && k === chosen ? " chosen" : "");
+    row.className = "value" + (asked.fresh && k === chosen ? " chosen" : "") + (ago > 0 ? " past" : "");
     bar.style.width = `${Math.max(2, (100 * (value - low)) / (high - low))}%`;
     number.textContent = `${((value / 10) * match.cycle_time).toFixed(1)} s`;
     row.append(names[k], bar, number);
     $("mind").append(row);
   });
-  $("mind").append(paragraph("What the learner expects of each choice, in seconds.", "quiet"));
+  const when = ago > 0 ? `expected of each choice when it last chose, ${ago.toFixed(1)} s ago` : "expects of each choice now";
+  $("mind").append(paragraph(`What the learner ${when}.`, "quiet"));
 }
 
 /** How far the player's idea of the others is off. */
@@ -444,6 +453,7 @@ function drawCurve() {
   }
   const mean = durations.reduce((a, b) => a + b, 0) / durations.length;
   const out = finished.filter((episode) => episode.outcome === 2).length / finished.length;
+  $("window").textContent = `mean of ${window}`;
   $("summary").textContent = `${finished.length}, mean ${mean.toFixed(1)} s, ${Math.round(100 * out)} % out of bounds`;
   board.setAttribute("aria-label",
     `Durations of ${finished.length} episodes: mean ${mean.toFixed(1)} s; line: mean of the last ${window}`);
