@@ -11,6 +11,7 @@ Ctrl-C ends it with weights and bag whole. Give a second match on this machine a
 """
 
 import argparse
+import itertools
 import json
 import os
 import shlex
@@ -109,7 +110,8 @@ def seat_agents(args: argparse.Namespace, task: Task) -> None:
 
 def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
-    own = {"task", "field", "seed", "speed", "episodes", "profile", "visible_angle", "record"}
+    own = {"task", "field", "seed", "speed", "episodes", "answer_timeout"}
+    own |= {"profile", "visible_angle", "record"}
     settings = {name: value for name, value in vars(args).items() if name in own}
     players = {
         name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
@@ -230,27 +232,48 @@ def play_in_processes(
             executor.spin_once(0.1)
             board.show()
             for name, code in processes.ended():
-                judge_end(name, code, board)
-                if args.restart and name != "simulator":
-                    processes.start(name, [*commands[name], "-p", "resume:=true"])
+                judge_end(name, code, board, args.restart)
+                if args.restart and code < 0:
+                    hear_all(executor)
+                    processes.start(name, [*commands[name], *going_on(args, name, board)])
             if not board.has_begun and time.monotonic() - started > START_TIMEOUT:
                 raise MatchError(f"nothing began within {START_TIMEOUT:.0f} s: {board.state}")
         processes.stop(["simulator"], END_TIMEOUT)
         for name in processes.stop(processes.names, END_TIMEOUT):
             print(f"match: {name} did not end and was killed", file=sys.stderr)
+    hear_all(executor)
+
+
+def hear_all(executor: Executor) -> None:
+    """Take in what has been said."""
     for _ in range(MOST_UNHEARD):
         executor.spin_once(0.0)
 
 
-def judge_end(name: str, code: int, board: Scoreboard) -> None:
+def judge_end(name: str, code: int, board: Scoreboard, restart: bool) -> None:
     """A process has ended by itself: is it the end of the match, an accident, or a failure?"""
-    if name == "simulator":
-        if code:
-            raise MatchError(f"the simulator ended with code {code}")
-    elif not board.has_begun:
+    is_simulator, was_killed = name == "simulator", code < 0
+    if is_simulator and not code:
+        return
+    if not board.has_begun:
         raise MatchError(f"{name} is missing: its process ended with code {code}")
-    else:
-        print(f"match: {name} ended with code {code}; it is missing now", file=sys.stderr)
+    if is_simulator and not (restart and was_killed):
+        raise MatchError(f"the simulator ended with code {code}")
+    print(f"match: {name} ended with code {code}; it is missing now", file=sys.stderr)
+
+
+def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str]:
+    """The parameters with which a node that was killed goes on where it was."""
+    if name != "simulator":
+        return ["-p", "resume:=true"]
+    first = ["-p", f"first_episode:={board.next_episode}"]
+    return [*first, "-p", f"record:={json.dumps(free_folder(args.record))}"]
+
+
+def free_folder(record: str) -> str:
+    """A bag's folder that is not there yet, named after another: out/bag_2, out/bag_3."""
+    numbered = (f"{record}_{number}" for number in itertools.count(2))
+    return next(folder for folder in numbered if not Path(folder).exists()) if record else ""
 
 
 def program(args: argparse.Namespace, member: Member) -> list[str]:
@@ -283,6 +306,9 @@ def parse() -> argparse.Namespace:
     add("--taker-policy", choices=list(TAKER_POLICIES), default="hand")
     add("--seed", type=int, default=0, help="every random number follows from it (default 0)")
     add("--speed", type=float, default=0.0, help="1 is real time; 0 (default): lock-step")
+    add(
+        "--answer-timeout", type=float, default=2.0, help="[s] who is slower is missing (default 2)"
+    )
     add("--field", default="25x25", help="length x width in metres (default 25x25)")
     add("--visible-angle", type=float, default=360.0, help="of players [deg] (default 360)")
     add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
@@ -291,7 +317,7 @@ def parse() -> argparse.Namespace:
     add("--save-every", type=int, default=100, help="and how often, in episodes (default 100)")
     add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")
     add("--resume", action="store_true", help="go on from the weights in --save-weights")
-    add("--restart", action="store_true", help="start players that died again, with their weights")
+    add("--restart", action="store_true", help="start nodes that were killed again where they were")
     add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
     add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")
     add("--agent", action="append", default=[], metavar="NAME=COMMAND", help="for one player")

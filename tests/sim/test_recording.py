@@ -1,9 +1,11 @@
 """Bags: whole, readable by others, readable when their writer was killed, and never overwritten."""
 
 import os
+import resource
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from keepaway_sim.cdr import codec
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import (
     ACTION_REQUEST,
+    CLOCK,
     EPISODE,
     FIELD_STATE,
     MATCH,
@@ -282,3 +285,25 @@ def test_older_definitions_are_kept_by_repair(tmp_path: Path) -> None:
 
 def test_the_match_comes_first(bag_3v2: Path) -> None:
     assert next(BagReader(bag_3v2).messages()).message_type == MATCH
+
+
+def test_a_full_disk_is_said_and_what_was_written_before_is_not_lost(
+    tmp_path: Path, full_disk: Callable[[int], None]
+) -> None:
+    clock = codec(CLOCK).encode({})
+    writer = BagWriter(tmp_path / "bag", compression="none", chunk_size=1000)
+    full_disk(30_000)
+
+    def write_on() -> None:
+        for time in range(10_000):
+            writer.write("/clock", CLOCK, clock, time)
+
+    with pytest.raises(KeepawayError, match=r"cannot be written any more: .*repair_bag"):
+        write_on()
+    writer.close()
+    full_disk(resource.RLIM_INFINITY)
+    whole = repair(tmp_path / "bag", tmp_path / "whole")
+    assert whole.complete
+    times = [message.log_time for message in whole.messages()]
+    assert times == list(range(len(times)))
+    assert writer.message_count - 100 < len(times) <= writer.message_count

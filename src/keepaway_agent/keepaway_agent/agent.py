@@ -32,6 +32,7 @@ class MatchFacts:
     cycle_time: float  # [s]
     seed: int
     code_version: str = ""
+    first_episode: int = 0  # more than 0 where a simulator goes on with a match begun before
 
     @property
     def num_players(self) -> int:
@@ -131,7 +132,7 @@ class Agent:
         keeps = self.role == Role.KEEPER
         self._rule = policies.keeper_decision if keeps else policies.taker_decision
         self._order = np.zeros(facts.num_players, dtype=np.int64)
-        self._random = policy_generator(facts.seed, index)
+        self._random = policy_generator(facts.seed, index, first_episode=facts.first_episode)
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
         self._has_learner = self._player.policy in (policies.LEARN, policies.GREEDY)
         self.episodes, self.hours, self.cut_off = 0, 0.0, 0
@@ -230,7 +231,12 @@ class Agent:
 _NO_VALUES = np.empty(0)
 
 
-def policy_generator(seed: int, index: int, trial: int = 0) -> np.random.Generator:
-    """The random numbers of a player's policy; its own in every trial and every match."""
-    key = (trial, POLICY_STREAM, index)
+def policy_generator(
+    seed: int, index: int, trial: int = 0, first_episode: int = 0
+) -> np.random.Generator:
+    """The random numbers of a player's policy; its own in every trial and every match.
+
+    Those of a match that goes on from `first_episode` are not those of its beginning again.
+    """
+    key = (trial, POLICY_STREAM, index, *([first_episode] if first_episode else []))
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

@@ -59,6 +59,7 @@ def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
         field_width=match["field_width"],
         cycle_time=match["cycle_time"],
         seed=match["seed"],
+        first_episode=match.get("first_episode", 0),
     )
     agents = {}
     for player, name in enumerate(match["player_names"]):

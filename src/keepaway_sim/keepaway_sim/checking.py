@@ -11,13 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from keepaway_sim.episodes import EpisodeSummary, MatchBag, Track
+from keepaway_sim.episodes import EpisodeSummary, MatchBag, Track, begin_match
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome
 from keepaway_sim.world import World
-
-WORLD_KEY = (0, 0)
-"""The spawn key of the world's seed in a match of nodes."""
 
 
 class Difference(NamedTuple):
@@ -46,7 +43,7 @@ def check_world(bag: MatchBag) -> Checked:
         KeepawayError: the bag does not begin with the match, or has gaps.
     """
     world = World(bag.task, bag.config)
-    world.start(0, np.random.SeedSequence(bag.match["seed"], spawn_key=WORLD_KEY))
+    begin_match(world, bag.match["seed"], bag.match.get("first_episode", 0))
     episodes = compared = 0
     for episode, track in whole_episodes(bag):
         if episode.number != world.perceptions.episode[0]:

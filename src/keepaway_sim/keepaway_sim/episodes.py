@@ -103,6 +103,21 @@ class FieldRecorder:
         self._bag.write(f"/{topic}", message_type, data, self._say.stamp_ns())
 
 
+WORLD_KEY = (0, 0)
+"""The spawn key of the world's seed in a match of nodes: trial 0; second, 1 is the players'."""
+
+
+def begin_match(world: World, seed: int, first_episode: int = 0) -> None:
+    """Kick off a match of nodes: field 0 of a world plays from `first_episode` on.
+
+    A match that goes on after its simulator died has random numbers of its own: they follow from
+    the seed and the number of the episode that it goes on with.
+    """
+    key = (*WORLD_KEY, first_episode) if first_episode else WORLD_KEY
+    world.start(0, np.random.SeedSequence(seed, spawn_key=key))
+    world.perceptions.episode[0] = first_episode
+
+
 def world_info(world: World, seed: int, **more: str) -> dict[str, str]:
     """What a bag says of the world that made it."""
     return {

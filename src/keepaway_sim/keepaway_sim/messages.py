@@ -161,7 +161,7 @@ class FieldMessages:
             }
         )
 
-    def match(self, seed: int, speed: float) -> bytes:
+    def match(self, seed: int, speed: float, first_episode: int = 0) -> bytes:
         """A Match message: what is played here."""
         task, config = self._world.task, self._world.config
         return codec(MATCH).encode(
@@ -179,6 +179,7 @@ class FieldMessages:
                 "player_names": task.player_names,
                 "code_version": code_version(),
                 "config_json": json.dumps(config.to_dict()),
+                "first_episode": first_episode,
             }
         )
 

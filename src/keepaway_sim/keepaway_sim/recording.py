@@ -11,6 +11,7 @@ Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry, rosbag2's `metad
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 import struct
@@ -144,6 +145,8 @@ class BagWriter:
             raise KeepawayError(
                 f"{self.path} exists already: choose another name, or remove it"
             ) from None
+        except OSError as error:
+            raise KeepawayError(f"{self.path} cannot be made: {error}") from error
         self.message_count = 0
         self._info: dict[str, str] = {}
         self.topics: dict[str, Topic] = {}
@@ -161,10 +164,14 @@ class BagWriter:
         self.flush()
 
     def add_info(self, **entries: str) -> None:
-        """Say more about what made the bag; written at once, later entries win."""
+        """Say more about what made the bag; written at once, later entries win.
+
+        Errors as in `write`.
+        """
         if entries:
             self._info.update(entries)
-            self._writer.add_metadata(INFO, entries)
+            with self._giving_up():
+                self._writer.add_metadata(INFO, entries)
 
     def add_topic(
         self,
@@ -218,12 +225,19 @@ class BagWriter:
             message_type: for example "keepaway_msgs/msg/Perception".
             data: CDR bytes.
             log_time: simulated time [ns].
+
+        Raises:
+            KeepawayError: the disk is full, or the like; this writer then writes no more, what it
+                has written can be read, and `repair` makes a whole bag of it.
         """
         channel = self._channels.get(topic)
         if channel is None:
             self.add_topic(topic, message_type)
             channel = self._channels[topic]
-        self._writer.add_message(channel, log_time, data, log_time, self._counts[topic])
+        try:
+            self._writer.add_message(channel, log_time, data, log_time, self._counts[topic])
+        except OSError as error:
+            raise self._given_up(error) from error
         self._counts[topic] += 1
         self.message_count += 1
         self._start, self._end = min(self._start, log_time), max(self._end, log_time)
@@ -231,25 +245,34 @@ class BagWriter:
             self.flush()
 
     def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
-        """Put a file into the bag, for example the weights that a player started from."""
-        self._writer.add_attachment(0, 0, name, media_type, data)
+        """Put a file into the bag, for example the weights that a player started from.
+
+        Errors as in `write`.
+        """
+        with self._giving_up():
+            self._writer.add_attachment(0, 0, name, media_type, data)
 
     def flush(self) -> None:
-        """End the chunk and give everything to the operating system."""
-        self._writer.flush()
+        """End the chunk and give everything to the operating system; errors as in `write`."""
+        with self._giving_up():
+            self._writer.flush()
         self._flushed = time.monotonic()
 
     def close(self) -> None:
-        """Finish the file and write `metadata.yaml`. Nothing happens the second time."""
+        """Finish the file and write `metadata.yaml`; errors as in `write`.
+
+        Nothing happens the second time, or after an error.
+        """
         if self._file is None:
             return
         metadata = self._metadata()
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": _to_yaml(metadata)})
-        self._writer.finish()
-        self._file.close()
-        self._file = None
         text = _to_yaml({"rosbag2_bagfile_information": metadata})
-        (self.path / "metadata.yaml").write_text(text)
+        with self._giving_up():
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": _to_yaml(metadata)})
+            self._writer.finish()
+            self._file.close()
+            (self.path / "metadata.yaml").write_text(text)
+        self._file = None
 
     def __enter__(self) -> Self:
         return self
@@ -261,6 +284,24 @@ class BagWriter:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+    @contextlib.contextmanager
+    def _giving_up(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._given_up(error) from error
+
+    def _given_up(self, error: OSError) -> KeepawayError:
+        """Let go of a file that cannot be written; what is still in memory is lost."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.close()
+        self._file = None
+        return KeepawayError(
+            f"{self.path} cannot be written any more: {error}; scripts/repair_bag.py makes a whole"
+            " bag of what is there"
+        )
 
     @property
     def _mcap_path(self) -> Path:

@@ -41,6 +41,7 @@ def match_facts(message: Match) -> MatchFacts:
         cycle_time=message.cycle_time,
         seed=message.seed,
         code_version=message.code_version,
+        first_episode=message.first_episode,
     )
 
 

@@ -21,7 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.agent import Agent, AgentConfig, check_config
-from keepaway_agent.errors import AgentError
+from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.nodes import conversions
 from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
@@ -110,6 +110,8 @@ class Player(Node):
         """Its own saved ones to resume from, or others, or none."""
         own = self._weights_path
         if own is None or not own.exists():
+            if own and files.resume:
+                self.get_logger().warning(f"resume: there is no {own} to go on from")
             return load_weights(Path(files.load_weights)) if files.load_weights else None
         if not files.resume:
             raise AgentError(f"save_weights={own}: is there already; resume:=true goes on from it")
@@ -132,7 +134,10 @@ class Player(Node):
         elif self._config.policy == "greedy":
             self.get_logger().warning("greedy without load_weights: it will choose at random")
         self.agent = agent
-        self.get_logger().info(f"plays {match.task} as {self._config.policy}, seed {match.seed}")
+        self.get_logger().info(
+            f"plays {match.task} as {self._config.policy}, seed {match.seed}, from episode"
+            f" {match.first_episode} on"
+        )
         self._announce()
 
     def _announce(self) -> None:
@@ -174,7 +179,10 @@ class Player(Node):
             self.get_logger().warning("the end of an episode was never perceived")
         self._announce()
         if self._save_every > 0 and agent.episodes % self._save_every == 0:
-            self.save()
+            try:
+                self.save()
+            except WeightsError as error:  # the disk may have room again next time
+                self.get_logger().error(f"after {agent.episodes} episodes: {error}")
 
     def _on_save(
         self, request: SaveWeights.Request, response: SaveWeights.Response

@@ -223,7 +223,8 @@ def main(args: list[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM.
 
     Returns:
-        0 where nothing is missing, 1 where something is, 2 where nothing can be recorded.
+        0 where nothing is missing, 1 where something is, 2 where nothing can be recorded (any
+        more).
     """
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stop = threading.Event()
@@ -235,9 +236,13 @@ def main(args: list[str] | None = None) -> int:
         get_logger("recorder").error(str(error))
         return 2
     recorder.get_logger().info(f"records to {recorder.bag.path}")
-    while not stop.wait(POLL_PERIOD):
-        recorder.poll()
-    report = recorder.finish()
+    try:
+        while not stop.wait(POLL_PERIOD):
+            recorder.poll()
+        report = recorder.finish()
+    except KeepawayError as error:
+        recorder.get_logger().error(str(error))
+        return 2
     missing = any(recorder.gaps.missing().values())
     log = recorder.get_logger().warning if missing else recorder.get_logger().info
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")

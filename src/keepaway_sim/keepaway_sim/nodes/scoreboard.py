@@ -52,6 +52,11 @@ class Scoreboard(Node):
         """Has there been a kick-off?"""
         return bool(self.episodes) or self.state == "plays"
 
+    @property
+    def next_episode(self) -> int:
+        """The number after the last that has ended."""
+        return max(self.episodes, default=-1) + 1
+
     def summary(self) -> dict[str, Any]:
         """The match in numbers, and every episode's cycles and outcome in order."""
         episodes = [episode for _, episode in sorted(self.episodes.items())]

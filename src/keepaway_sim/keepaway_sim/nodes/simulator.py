@@ -33,7 +33,7 @@ from keepaway_msgs.msg import ActionRequest, AgentStatus
 from keepaway_sim import messages
 from keepaway_sim.cdr import codec
 from keepaway_sim.config import CYCLE_TIME, PROFILES, Config, profile
-from keepaway_sim.episodes import world_info
+from keepaway_sim.episodes import begin_match, world_info
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.messages import FieldMessages
 from keepaway_sim.nodes.health import diagnostics
@@ -45,8 +45,6 @@ from keepaway_sim.roster import Roster
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.world import World
 
-WORLD_STREAM = 0
-"""Second entry of the world's spawn key; 1 is that of the players' policies."""
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
 HEALTH_PERIOD = 1.0  # [s]
@@ -72,7 +70,8 @@ class Settings:
     field: str = "25x25"  # length x width [m]
     seed: int = 0
     speed: float = 0.0  # simulated over wall time; 0: as fast as the players answer
-    episodes: int = 0  # to play; 0: without end
+    episodes: int = 0  # to play, those before first_episode included; 0: without end
+    first_episode: int = 0  # its number; to go on with a match whose simulator died
     answer_timeout: float = 2.0  # [s] wall time; a player who takes longer is missing
     autostart: bool = True  # kick off when all players are there
     record: str = ""  # folder of a bag to write; empty: none
@@ -81,7 +80,7 @@ class Settings:
     wait_for_recorder: bool = False  # play no faster than a recorder's node follows
 
     def __post_init__(self) -> None:
-        for name in ("seed", "episodes", "speed"):
+        for name in ("seed", "episodes", "first_episode", "speed"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise KeepawayError(f"{name}={getattr(self, name)}: give 0 or more")
         if not 0 < self.answer_timeout < float("inf"):
@@ -98,7 +97,8 @@ class Simulator(Node):
     Attributes:
         settings, world: what is played.
         roster: who plays.
-        num_finished, num_cycles: episodes that have ended, cycles played.
+        num_finished: episodes that have ended, those before `first_episode` included.
+        num_cycles: played here.
     """
 
     def __init__(self, **node_options: Any) -> None:
@@ -114,11 +114,10 @@ class Simulator(Node):
         self.settings = declared(self, Settings, CHANGEABLE)
         task = Task.parse(self.settings.task, self.settings.field)
         self.world = World(task, self._declare_config())
-        seeds = np.random.SeedSequence(self.settings.seed, spawn_key=(0, WORLD_STREAM))
-        self.world.start(0, seeds)
+        begin_match(self.world, self.settings.seed, self.settings.first_episode)
         compile_world(task, self.world.config)
         self.roster = Roster(task, self.world.config)
-        self.num_finished = self.num_cycles = 0
+        self.num_finished, self.num_cycles = self.settings.first_episode, 0
         self._is_running, self._is_reset = self.settings.autostart, False
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
@@ -132,8 +131,8 @@ class Simulator(Node):
         self._bag = self._open_bag()
         self._voice = Voice(self, task.player_names, self._bag)
         self._listen()
-        match = self._messages.match(self.settings.seed, self.settings.speed)
-        self._voice.say("match", match, 0)
+        played = self.settings.seed, self.settings.speed, self.settings.first_episode
+        self._voice.say("match", self._messages.match(*played), 0)
 
     def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
         """Play until all episodes are over, or somebody says so, or ROS is shut down."""
@@ -158,9 +157,15 @@ class Simulator(Node):
         super().destroy_node()
 
     def close(self) -> None:
-        """Finish the bag."""
+        """Finish the bag.
+
+        Raises:
+            KeepawayError: it is not whole.
+        """
         if self._bag is not None:
             self._bag.close()
+        if self._voice.trouble:
+            raise KeepawayError(self._voice.trouble)
 
     # Making the node.
 
@@ -402,8 +407,9 @@ class Simulator(Node):
 
     def _is_taken_in(self) -> bool:
         played = 0 < self.settings.episodes <= self.num_finished
+        num_here = self.num_finished - self.settings.first_episode
         return not played or all(
-            self._statuses[player]["episodes"] >= self._first_counts[player] + self.num_finished
+            self._statuses[player]["episodes"] >= self._first_counts[player] + num_here
             for player, seat in enumerate(self.roster.seats)
             if seat.present
         )

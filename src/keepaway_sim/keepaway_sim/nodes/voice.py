@@ -13,6 +13,7 @@ from visualization_msgs.msg import MarkerArray
 
 from keepaway_msgs.msg import Episode, FieldState, Match, Perception
 from keepaway_sim import messages
+from keepaway_sim.errors import KeepawayError
 from keepaway_sim.recording import BagWriter
 
 QUEUE = QoSProfile(depth=200)
@@ -30,12 +31,17 @@ TOPICS = {
 
 
 class Voice:
-    """Says messages, given as CDR bytes, on a node's topics and into a bag."""
+    """Says messages, given as CDR bytes, on a node's topics and into a bag.
+
+    Attributes:
+        trouble: why the bag is no longer written, in words; empty while it is.
+    """
 
     def __init__(self, node: Node, player_names: tuple[str, ...], bag: BagWriter | None) -> None:
         """Make a publisher for every topic; `bag` may be None."""
         perceptions = {f"{name}/perception": _PERCEPTION for name in player_names}
-        self._bag = bag
+        self._bag, self._logger = bag, node.get_logger()
+        self.trouble = ""
         self._publishers: dict[str, Publisher] = {}
         self._types: dict[str, str] = {}
         for topic, (message_class, message_type, qos) in (TOPICS | perceptions).items():
@@ -47,7 +53,7 @@ class Voice:
         publisher = self._publishers[topic]
         publisher.publish(data)
         if self._bag is not None:
-            self._bag.write(publisher.topic_name, self._types[topic], data, time)
+            self.note(publisher.topic_name, self._types[topic], data, time)
 
     def repeat(self, topic: str, data: bytes) -> None:
         """Publish what was said before."""
@@ -67,9 +73,17 @@ class Voice:
         self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
 
     def note(self, topic: str, message_type: str, data: bytes, time: int) -> None:
-        """Record what somebody else said, if a bag is written; `topic` is its name in full."""
-        if self._bag is not None:
+        """Record what somebody else said, if a bag is written; `topic` is its name in full.
+
+        A bag that cannot be written (the disk is full) ends there; the match does not.
+        """
+        if self._bag is None:
+            return
+        try:
             self._bag.write(topic, message_type, data, time)
+        except KeepawayError as error:
+            self._bag, self.trouble = None, str(error)
+            self._logger.error(f"the match goes on unrecorded: {error}")
 
 
 _PERCEPTION = (Perception, messages.PERCEPTION, QUEUE)
