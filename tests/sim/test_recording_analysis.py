@@ -1,6 +1,7 @@
 """A bag's analysis: every number is what a slow, plain count over the tracks gives."""
 
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -66,6 +67,8 @@ def test_chunks_do_not_matter(bag_3v2: Path, tmp_path: Path, table: pd.DataFrame
 def test_tables_and_figures_are_written(bag_3v2: Path, tmp_path: Path, table: pd.DataFrame) -> None:
     said = analyse(bag_3v2, tmp_path)
     assert "3v2: 4 episodes in" in said
+    decisions = int(table.decisions.sum())
+    assert sum(map(int, re.findall(r"of (\d+) requests with the ball", said))) == decisions
     pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "episodes.parquet"), table)
     written = pd.read_csv(tmp_path / "episodes.csv")
     pd.testing.assert_frame_equal(written, table)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +29,8 @@ from keepaway_sim.task import Action, Outcome, Task
 ROWS_AT_ONCE = 5000  # episodes that are written together
 COLOURS = {Outcome.TAKEN_AWAY: "#d55e00", Outcome.OUT_OF_BOUNDS: "#8a5fb0"}
 BLUE = "#0072b2"
+ACTION_COLOURS = (BLUE, "#56b4e9", "#009e73", "#e69f00", "#cc79a7")
+WITH_BALL = (Action.HOLD_BALL, Action.PASS_BALL)
 
 
 class EpisodeRow(NamedTuple):
@@ -292,11 +294,19 @@ def in_words(summary: Mapping[str, Any]) -> str:
         f" {summary['out_of_bounds_share']:.0%} ended out of bounds,"
         f" {summary['passes_per_episode']:.1f} passes arrived an episode",
     ]
+    with_ball = {action.name.lower() for action in WITH_BALL}
     for name, actions in summary["actions"].items():
-        total = sum(actions.values())
-        shares = ", ".join(f"{action} {n / total:.0%}" for action, n in actions.items())
-        lines.append(f"{name}: {shares or 'asked for nothing'}")
+        choices = {action: n for action, n in actions.items() if action in with_ball}
+        others = {action: n for action, n in actions.items() if action not in with_ball}
+        said = [_shares(choices, " with the ball"), _shares(others, "")]
+        lines.append(f"{name}: {'; '.join(filter(None, said)) or 'asked for nothing'}")
     return "\n".join(lines)
+
+
+def _shares(actions: Mapping[str, int], when: str) -> str:
+    total = sum(actions.values())
+    shares = ", ".join(f"{name} {count / total:.0%}" for name, count in actions.items())
+    return shares and f"{shares} of {total:,} requests{when}"
 
 
 def hold_time_figure(durations: np.ndarray) -> Figure:
@@ -307,7 +317,7 @@ def hold_time_figure(durations: np.ndarray) -> Figure:
     window = max(1, min(1000, len(durations) // 10))
     shown = max(1, len(durations) // 5000)
     number = np.arange(len(durations))
-    axes.plot(number[::shown], durations[::shown], ".", color="0.7", markersize=2.5)
+    axes.plot(number[::shown], durations[::shown], ".", color="0.65", markersize=_dot(len(number)))
     sums = np.cumsum(np.concatenate([[0.0], durations]))
     start = np.maximum(number + 1 - window, 0)
     mean = (sums[number + 1] - sums[start]) / (number + 1 - start)
@@ -322,6 +332,8 @@ def passes_figure(passes: np.ndarray, task: Task) -> Figure:
     figure, axes = _figure("Passes that arrived", "to", "from")
     names = task.player_names[: task.num_keepers]
     axes.imshow(passes, cmap="Blues", vmin=0)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(length=0)
     strongest = max(1, int(passes.max()))
     for (row, column), number in np.ndenumerate(passes):
         if row != column:
@@ -335,35 +347,65 @@ def passes_figure(passes: np.ndarray, task: Task) -> Figure:
 def losses_figure(losses: np.ndarray, task: Task) -> Figure:
     """Where the ball was when episodes ended; (n, 3) x, y [m], outcome."""
     figure, axes = _figure("Where the ball was lost", "x (m)", "y (m)")
+    figure.set_size_inches(5.6, 5.6)
     length, width = task.field_length, task.field_width
     border = Rectangle((-length / 2, -width / 2), length, width, fill=False, edgecolor="0.3")
     axes.add_patch(border)
-    every = max(1, len(losses) // 4000)
+    every, size = max(1, len(losses) // 4000), 1.5 * _dot(len(losses))
     for outcome, colour in COLOURS.items():
         of_kind = losses[losses[:, 2] == outcome]
         label = f"{outcome.name.lower().replace('_', ' ')} ({len(of_kind):,})"
-        axes.plot(*of_kind[::every, :2].T, ".", color=colour, markersize=4, alpha=0.6, label=label)
+        x, y = of_kind[::every, :2].T
+        axes.plot(x, y, ".", color=colour, markersize=size, alpha=0.6, label=label)
     axes.set_aspect("equal")
     axes.set_xlim(-length / 2 - 2, length / 2 + 2)
     axes.set_ylim(-width / 2 - 2, width / 2 + 2)
-    figure.legend(frameon=False, loc="outside right upper", fontsize=8)
+    figure.legend(
+        frameon=False,
+        loc="outside lower center",
+        ncols=len(COLOURS),
+        fontsize=8,
+        markerscale=7.0 / size,
+    )
     return figure
 
 
 def actions_figure(actions: np.ndarray, task: Task) -> Figure:
-    """What every player asked for, in shares."""
-    figure, axes = _figure("What players asked for", "share of requests", "")
-    totals = np.maximum(actions.sum(axis=1, keepdims=True), 1)
-    shares, left = actions / totals, np.zeros(len(actions))
-    for action in Action:
-        share = shares[:, action]
-        label = action.name.lower().replace("_", " ")
-        axes.barh(task.player_names, share, left=left, label=label, height=0.7)
-        left = left + share
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1)
+    """What players asked for, in shares: keepers with the ball, and everybody without it."""
+    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    _draw_shares(left, actions, WITH_BALL, "With the ball", task)
+    _draw_shares(right, actions, [a for a in Action if a not in WITH_BALL], "Without it", task)
+    left.invert_yaxis()
     figure.legend(frameon=False, loc="outside lower center", ncols=len(Action), fontsize=8)
     return figure
+
+
+def _draw_shares(
+    axes: Axes, actions: np.ndarray, chosen: Sequence[Action], title: str, task: Task
+) -> None:
+    """Bars of the shares of some actions among each other, and how many there were."""
+    names, counts = task.player_names, actions[:, list(chosen)]
+    totals = counts.sum(axis=1)
+    begin = np.zeros(len(counts))
+    for action, count in zip(chosen, counts.T, strict=True):
+        if count.any():
+            share, label = count / np.maximum(totals, 1), action.name.lower().replace("_", " ")
+            colour = ACTION_COLOURS[action]
+            axes.barh(names, share, left=begin, label=label, height=0.7, color=colour)
+            begin = begin + share
+    for place, total in enumerate(totals.tolist()):
+        axes.text(1.02, place, f"{total:,}" if total else "", va="center", fontsize=7, color="0.35")
+    axes.set_title(title, fontsize=11, loc="left")
+    axes.set_xlabel("share of requests; beside: how many")
+    axes.set_xlim(0, 1)
+    axes.set_yticks(range(len(names)), names)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _dot(count: int) -> float:
+    """The size [points] of each of so many dots."""
+    return float(np.clip(40 / np.sqrt(max(count, 1)), 1.5, 5.0))
 
 
 def _figure(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
