@@ -34,7 +34,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.options import ros_arguments
-from keepaway_sim.processes import Processes
+from keepaway_sim.processes import Processes, script_command
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 
@@ -280,8 +280,7 @@ def program(args: argparse.Namespace, member: Member) -> list[str]:
     """The command that starts a node."""
     if member.name not in args.agent:
         return [sys.executable, str(SCRIPTS / f"{member.program}.py")]
-    words = shlex.split(args.agent[member.name])
-    return [sys.executable, *words] if words[0].endswith(".py") else words
+    return script_command(shlex.split(args.agent[member.name]))
 
 
 def report(args: argparse.Namespace, summary: dict[str, object]) -> None:

@@ -100,6 +100,7 @@ class Agent:
         facts, index, config: the match, the place in match order, how it plays.
         learners: its one learner (`sarsa.Learners`), also when its policy does not learn.
         tiling: of the learner's state variables.
+        has_learner: whether its policy asks the learner.
         episodes, hours: what it has played to the end [simulated h], loaded weights' included.
         cut_off: episodes that taught nothing: aborted, or their end was never perceived.
     """
@@ -134,7 +135,7 @@ class Agent:
         self._order = np.zeros(facts.num_players, dtype=np.int64)
         self._random = policy_generator(facts.seed, index, first_episode=facts.first_episode)
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
-        self._has_learner = self._player.policy in (policies.LEARN, policies.GREEDY)
+        self.has_learner = self._player.policy in (policies.LEARN, policies.GREEDY)
         self.episodes, self.hours, self.cut_off = 0, 0.0, 0
         self._moment = (-1, 0)  # episode and cycle last perceived
         self._in_play = False
@@ -208,7 +209,7 @@ class Agent:
         if not chose:
             return Decision(int(action), int(target), _NO_VALUES)
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
-        values = self.learners.values[0].copy() if self._has_learner else _NO_VALUES
+        values = self.learners.values[0].copy() if self.has_learner else _NO_VALUES
         return Decision(int(action), int(target), values)
 
     def _end_episode(self, cycle: int, outcome: int) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
@@ -57,6 +58,10 @@ class Processes:
         """The id of a running one."""
         return self._running[name].pid
 
+    def is_running(self, name: str) -> bool:
+        """Whether one that was started has not ended."""
+        return self._running[name].poll() is None
+
     def ended(self) -> list[Ended]:
         """Those that have ended since they were asked for last."""
         codes = {name: process.poll() for name, process in self._running.items()}
@@ -85,6 +90,11 @@ class Processes:
                 killed.append(name)
         return killed
 
+    def end(self, name: str, patience: float) -> int | None:
+        """End one like `stop`; its exit code, or None if it had to be killed."""
+        process = self._running[name]
+        return None if self.stop([name], patience) else process.returncode
+
     def __enter__(self) -> Self:
         return self
 
@@ -95,6 +105,15 @@ class Processes:
         trace: TracebackType | None,
     ) -> None:
         self.stop(self.names, patience=5.0)
+
+
+def script_command(words: Sequence[str]) -> list[str]:
+    """A command as it is started: a Python script by the Python that runs this.
+
+    >>> script_command(["./my_agent", "--brave"])
+    ['./my_agent', '--brave']
+    """
+    return [sys.executable, *words] if words[0].endswith(".py") else list(words)
 
 
 def _end_with_parent() -> None:

@@ -128,7 +128,8 @@ class Player(Node):
         agent = Agent(conversions.match_facts(match), match.player_names.index(name), self._config)
         if agent.role != self._role:
             raise AgentError(f"{name} is a {agent.role.name.lower()}'s name in this match")
-        known = self.agent.learned(name) if self.agent else self._start_weights
+        has_learned = self.agent and self.agent.has_learner
+        known = self._learned() if has_learned else self._start_weights
         if known:
             agent.use(known)
         elif self._config.policy == "greedy":

@@ -1,0 +1,60 @@
+"""scripts/check_agent.py as a person runs it: built-in players pass, one that misbehaves fails."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "src" / "keepaway_agent" / "examples"
+
+pytestmark = pytest.mark.usefixtures("ros_domain")
+
+
+def check(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, str(ROOT / "scripts" / "check_agent.py"), "--answer-timeout", "20"]
+    return subprocess.run(
+        [*command, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=240
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "num_sentences"),
+    [
+        (["--one-size", "--", "scripts/keeper.py", "--policy", "learn"], 13),
+        (["--name", "taker_2", "--", "scripts/taker.py"], 14),
+        (["--name", "keeper_3", "--", EXAMPLES / "smallest_agent.py"], 14),
+    ],
+    ids=["keeper", "taker", "smallest"],
+)
+def test_they_keep_to_the_contract(arguments: list[object], num_sentences: int) -> None:
+    checked = check(*arguments)
+    assert checked.stdout.endswith(f"{num_sentences} of {num_sentences} sentences hold\n"), (
+        checked.stdout + checked.stderr
+    )
+    assert checked.returncode == 0
+
+
+def test_what_an_agent_does_wrong_is_said(tmp_path: Path) -> None:
+    text = (EXAMPLES / "smallest_agent.py").read_text()
+    agent = tmp_path / "rude.py"
+    agent.write_text(
+        text.replace("ActionRequest.GET_OPEN", "ActionRequest.MARK_KEEPER")
+        .replace("index=self.index, action", "index=self.index + 1, action")
+        .replace("    main()\n", "    main()\n    raise SystemExit(3)\n")
+    )
+    checked = check("--", agent)
+    assert checked.returncode == 1
+    failed = [line for line in checked.stdout.splitlines() if line.startswith("FAILS")]
+    assert len(failed) == 3, checked.stdout
+    assert "the first that is not: player_index 1, not 0" in failed[0]
+    assert "the first that is not: action 4 target 0" in failed[1]
+    assert "exit code 3" in failed[2]
+
+
+def test_a_command_that_there_is_not_is_refused_in_a_line() -> None:
+    checked = check("--", "no_such_agent")
+    assert checked.returncode == 2
+    assert "no_such_agent" in checked.stderr
+    assert "Traceback" not in checked.stderr
