@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from keepaway_sim.compiled import compiled
-from keepaway_sim.config import NEVER
+from keepaway_sim.config import NEVER, ROLL_CYCLES
 from keepaway_sim.geometry import clip, length
 from keepaway_sim.physics import limited
 
@@ -81,10 +81,11 @@ def _off(ux, uy, rel_x, rel_y, rest, allowed, back_distance):
 @compiled
 def _turned(ux, uy, to_x, to_y, most):
     """The unit vector u turned toward the unit vector `to`, but by no more than `most` [rad]."""
-    if most > 3.0:  # a player at rest turns anywhere
+    ahead = ux * to_x + uy * to_y
+    if most > 3.0 or (most > 1.6 and ahead >= 0.0):  # slow players turn anywhere, or half round
         return to_x, to_y
     cosine = math.cos(most)
-    if ux * to_x + uy * to_y >= cosine:
+    if ahead >= cosine:
         return to_x, to_y
     sine = math.sqrt(1.0 - cosine * cosine)
     if ux * to_y - uy * to_x < 0.0:
@@ -94,25 +95,38 @@ def _turned(ux, uy, to_x, to_y, most):
 
 @compiled
 def reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
-    """Distance to a point that is left after `cycles` of going there (P: intercept loop)."""
+    """Distance to a point that is left after `cycles` of going there (P: intercept loop).
+
+    The player turns as long as it must, then runs on its line. Simplified: the speed limit of a
+    player that rolls sideways while it dashes at full power is left out.
+    """
     turning = True
-    for k in range(cycles):
-        left = cycles - k
-        if turning:
-            turning, ux, uy = heading_to_go(
-                c, x, y, vx, vy, ux, uy, to_x, to_y, left, c.back_dash_distance
-            )
+    while cycles > 0:
+        turning, ux, uy = heading_to_go(
+            c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance
+        )
         if not turning:
-            along = ux * (to_x - x) + uy * (to_y - y)
-            power = dash_power(c, along, ux * vx + uy * vy, left)
-            vx, vy = limited(
-                vx + c.dash_power_rate * power * ux,
-                vy + c.dash_power_rate * power * uy,
-                c.player_speed_max,
-            )
+            break
         x, y = x + vx, y + vy
         vx, vy = c.player_decay * vx, c.player_decay * vy
-    return length(to_x - x, to_y - y)
+        cycles -= 1
+    rel_x, rel_y = to_x - x, to_y - y
+    along, speed = ux * rel_x + uy * rel_y, ux * vx + uy * vy
+    across = ux * rel_y - uy * rel_x - c.player_roll[cycles] * (ux * vy - uy * vx)
+    forward, speed = (along, speed) if along >= 0.0 else (-along, -speed)
+    return length(max(forward - full_run(c, speed, cycles), 0.0), across)
+
+
+@compiled
+def full_run(c, speed, cycles):
+    """Metres made in `cycles` of dashing at full power, from a speed of `speed` ahead.
+
+    Speeds before decay approach `top` geometrically, so after k dashes the way made is
+    top * k + (first - top) * (1 - decay**k) / (1 - decay).
+    """
+    dash = 100.0 * c.dash_power_rate
+    top = min(dash / (1.0 - c.player_decay), c.player_speed_max)
+    return top * cycles + (speed + dash - top) * c.player_roll[min(cycles, ROLL_CYCLES - 1)]
 
 
 @compiled
@@ -170,9 +184,6 @@ def _left_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
 def run_cycles(c, distance, speed):
     """Full dashes needed to come within kicking distance of a point straight ahead.
 
-    Speeds before decay approach `top` geometrically, so after k dashes the way made is
-    top * k + (first - top) * (1 - decay**k) / (1 - decay).
-
     Args:
         distance: to the point [m].
         speed: the player's own toward it [m/cycle].
@@ -180,10 +191,11 @@ def run_cycles(c, distance, speed):
     needed = distance - c.kickable_distance
     if needed <= 0.0:
         return 0
-    top = min(100.0 * c.dash_power_rate / (1.0 - c.player_decay), c.player_speed_max)
-    lag = (speed + 100.0 * c.dash_power_rate - top) / (1.0 - c.player_decay)
-    cycles = max(int((needed - max(lag, 0.0)) / top), 1)
-    while top * cycles + lag * (1.0 - c.player_decay**cycles) < needed:
+    dash = 100.0 * c.dash_power_rate
+    top = min(dash / (1.0 - c.player_decay), c.player_speed_max)
+    head_start = max(speed + dash - top, 0.0) / (1.0 - c.player_decay)
+    cycles = max(int((needed - head_start) / top), 1)
+    while full_run(c, speed, cycles) < needed:
         cycles += 1
     return cycles
 

@@ -120,12 +120,9 @@ class World:
         Raises:
             KeepawayError: a request that its player cannot carry out; nothing was played.
         """
-        illegal = _first_illegal(self._constants, self.state, self.perceptions, action, target)
-        if illegal >= 0:
-            self._refuse(illegal, action, target)
         self._streams.refill()
         random = self._streams.uniforms, self._streams.cursor
-        _act(
+        illegal = _act(
             self._constants,
             self.state,
             self.perceptions,
@@ -138,6 +135,8 @@ class World:
             target,
             *random,
         )
+        if illegal >= 0:
+            self._refuse(illegal, action, target)
         touched = self._bodies.move()
         self._touched[:] = False
         self._touched[touched] = True
@@ -197,7 +196,7 @@ def is_legal(c, player, action, target):
     return action in (_HOLD, _OPEN, _GO)
 
 
-@compiled_apart
+@compiled
 def _first_illegal(c, state, s, action, target):
     num = c.num_keepers + c.num_takers
     for f in range(len(state.running)):
@@ -242,7 +241,15 @@ def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
 
 @compiled_apart
 def _act(c, state, s, m, speech, motion, place, acceleration, action, target, uniforms, cursor):
-    """Requests become commands, commands become this cycle's velocities."""
+    """Requests become commands, commands become this cycle's velocities.
+
+    Returns:
+        The first request (counted over all players) that is illegal, if any: then nothing was
+        done; else -1.
+    """
+    illegal = _first_illegal(c, state, s, action, target)
+    if illegal >= 0:
+        return illegal
     num = c.num_keepers + c.num_takers
     for f in range(len(state.running)):
         if not state.running[f] or s.outcome[f] != _IN_PLAY:
@@ -258,6 +265,7 @@ def _act(c, state, s, m, speech, motion, place, acceleration, action, target, un
             motion[f, o, 0] = state.position[f, o, 0] + place[f, 0]
             motion[f, o, 1] = state.position[f, o, 1] + place[f, 1]
             motion[f, o, 2], motion[f, o, 3] = vx, vy
+    return -1
 
 
 @compiled
