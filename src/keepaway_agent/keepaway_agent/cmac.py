@@ -207,14 +207,18 @@ def tile_cells(state, lows, widths, num_weights, cells):
 
 @compiled
 def window_sum(window):
-    """Sum of 32 neighbouring weights: four sums side by side, then their sum."""
-    s0 = s1 = s2 = s3 = 0.0
-    for k in range(0, NUM_TILINGS, 4):
+    """Sum of 32 neighbouring weights: eight sums side by side, then their sum."""
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    for k in range(0, NUM_TILINGS, 8):
         s0 += window[k]
         s1 += window[k + 1]
         s2 += window[k + 2]
         s3 += window[k + 3]
-    return (s0 + s1) + (s2 + s3)
+        s4 += window[k + 4]
+        s5 += window[k + 5]
+        s6 += window[k + 6]
+        s7 += window[k + 7]
+    return ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7))
 
 
 @compiled

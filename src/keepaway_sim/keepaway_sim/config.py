@@ -21,6 +21,10 @@ from keepaway_sim.task import MAX_FIELD_SIDE, Task
 
 CYCLE_TIME = 0.1  # [s] S: simulator_step
 ROLL_CYCLES = 128  # entries of the two tables of rolling distances
+SIGHT_NEAREST, SIGHT_FARTHEST = 0.01, 200.0  # [m] range of the tables of seen distances
+SIGHT_CELLS = 8.0  # [1/m] their fineness
+SIGHT_STEP = 0.1  # [m] S: reported distances are rounded to it
+FINEST_DIRECTION = 0.01  # [deg] finest rounding of seen directions
 NEVER = 65535  # [cycles] age of what was never seen; also "cannot reach the ball"
 
 
@@ -116,6 +120,11 @@ class Config:
             decay = getattr(self.physics, name)
             if not 0.0 < decay < 1.0:
                 raise KeepawayError(f"{name}={decay}: give a share between 0 and 1")
+        if 0.0 < self.vision.direction_step < FINEST_DIRECTION:
+            raise KeepawayError(
+                f"direction_step={self.vision.direction_step}: give 0 (exact), or"
+                f" {FINEST_DIRECTION} degrees or more"
+            )
         if not self.vision.look_period >= 1:
             raise KeepawayError(f"look_period={self.vision.look_period}: give 1 or more cycles")
         if not 1 <= self.skills.intercept_horizon <= ROLL_CYCLES // 2:
@@ -231,7 +240,19 @@ _DIVISORS = (
     "kickable_margin",
     "pass_end_speed",
 )
-_DERIVED = ("kickable_distance", "touch_distance", "ball_roll", "player_roll")
+_DERIVED = (
+    "kickable_distance",  # [m] between centres
+    "touch_distance",  # [m] between centres
+    "full_dash",  # [m/cycle^2] acceleration at full power
+    "top_speed",  # [m/cycle] of a player who keeps dashing
+    "ball_roll",  # (ROLL_CYCLES,) see `_roll_table`
+    "player_roll",
+    "sight_edge",  # [m] where reported distances change, see `_sight_tables`
+    "sight_value",  # [m] the reported distance below each edge
+    "sight_first",  # the first edge beyond each whole multiple of 1 / SIGHT_CELLS m
+    "direction_cosine",  # of every direction that is seen, from -pi to pi
+    "direction_sine",
+)
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
 Constants: Any = namedtuple(  # type: ignore[misc]
@@ -252,6 +273,12 @@ def pack(task: Task, config: Config) -> Any:
     physics = config.physics
     values["touch_distance"] = physics.player_size + physics.ball_size
     values["kickable_distance"] = values["touch_distance"] + physics.kickable_margin
+    values["full_dash"] = 100.0 * physics.dash_power_rate
+    values["top_speed"] = min(
+        values["full_dash"] / (1.0 - physics.player_decay), physics.player_speed_max
+    )
+    values |= _sight_tables(config.vision.quantize_step)
+    values |= _direction_tables(values["direction_step"])
     values["ball_roll"] = _roll_table(physics.ball_decay)
     values["player_roll"] = _roll_table(physics.player_decay)
     return Constants(**values)
@@ -260,6 +287,31 @@ def pack(task: Task, config: Config) -> Any:
 def _roll_table(decay: float) -> np.ndarray:
     """(ROLL_CYCLES,) distance over first speed of what rolls for 0, 1, .. cycles."""
     return (1.0 - decay ** np.arange(ROLL_CYCLES)) / (1.0 - decay)
+
+
+def _sight_tables(step: float) -> dict[str, np.ndarray]:
+    """Tables of the distances that players see.
+
+    S visualsenderplayer.cpp `calcQuantDist`: the logarithm is rounded to `step`, then what comes
+    of it to 0.1 m. So the reported distance changes where logarithms lie half a step between.
+    """
+    step = step or 1.0  # exact distances need no tables
+    first, last = math.log(SIGHT_NEAREST) // step, math.log(SIGHT_FARTHEST) // step
+    steps = np.arange(first, last + 1) * step
+    edge = np.append(np.exp(steps[:-1] + 0.5 * step), math.inf)
+    cells = np.arange(int(SIGHT_FARTHEST * SIGHT_CELLS)) / SIGHT_CELLS
+    return {
+        "sight_edge": edge,
+        "sight_value": np.round(np.exp(steps) / SIGHT_STEP) * SIGHT_STEP,
+        "sight_first": np.searchsorted(edge, cells, side="right"),
+    }
+
+
+def _direction_tables(step: float) -> dict[str, np.ndarray]:
+    """Cosines and sines of the directions that players see, multiples of `step` [rad]."""
+    most = math.ceil(math.pi / step) if step > 0.0 else 0
+    direction = step * np.arange(-most, most + 1)
+    return {"direction_cosine": np.cos(direction), "direction_sine": np.sin(direction)}
 
 
 def _check_numbers(group: object) -> None:

@@ -121,12 +121,11 @@ def reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
 def full_run(c, speed, cycles):
     """Metres made in `cycles` of dashing at full power, from a speed of `speed` ahead.
 
-    Speeds before decay approach `top` geometrically, so after k dashes the way made is
+    Speeds before decay approach the top speed geometrically, so after k dashes the way made is
     top * k + (first - top) * (1 - decay**k) / (1 - decay).
     """
-    dash = 100.0 * c.dash_power_rate
-    top = min(dash / (1.0 - c.player_decay), c.player_speed_max)
-    return top * cycles + (speed + dash - top) * c.player_roll[min(cycles, ROLL_CYCLES - 1)]
+    roll = c.player_roll[min(cycles, ROLL_CYCLES - 1)]
+    return c.top_speed * cycles + (speed + c.full_dash - c.top_speed) * roll
 
 
 @compiled
@@ -148,7 +147,7 @@ def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old)
         roll = c.ball_roll[i]
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
         off = length(bx - old_x, by - old_y) if has_old else math.inf
-        moving = speed * (1.0 - (1.0 - c.ball_decay) * roll) > MOVING_BALL
+        moving = speed * _left_of_speed(c, roll) > MOVING_BALL
         candidate = moving and off < kept_off
         skip = 1
         if first == NEVER or candidate:
@@ -191,10 +190,8 @@ def run_cycles(c, distance, speed):
     needed = distance - c.kickable_distance
     if needed <= 0.0:
         return 0
-    dash = 100.0 * c.dash_power_rate
-    top = min(dash / (1.0 - c.player_decay), c.player_speed_max)
-    head_start = max(speed + dash - top, 0.0) / (1.0 - c.player_decay)
-    cycles = max(int((needed - head_start) / top), 1)
+    lag = (c.top_speed - c.full_dash - speed) * c.player_roll[ROLL_CYCLES - 1]
+    cycles = max(int((needed + min(lag, 0.0)) / c.top_speed), 1)
     while full_run(c, speed, cycles) < needed:
         cycles += 1
     return cycles
@@ -233,7 +230,7 @@ def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
         needed = cycles_to_point(c, x, y, vx, vy, ux, uy, bx, by)
         if needed <= i:
             return needed
-        i += max(int((needed - i) / (1.0 + speed)), 1)
+        i += max(int((needed - i) / (1.0 + speed * _left_of_speed(c, roll))), 1)
     return NEVER
 
 
@@ -241,18 +238,24 @@ def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
 def _straight_run(c, x, y, vx, vy, ball, ball_v):
     """Cycles before which nobody reaches the ball, even running straight without a turn.
 
-    The gap between cycles needed and cycles passed closes by no more than one plus the ball's
-    speed a cycle, so several may be skipped at once.
+    The distance to a ball on a straight line is a convex function of the way it has rolled, so
+    it falls by no more than it falls now; cycles in which it cannot have fallen enough are skipped.
     """
-    speed, own = length(ball_v[0], ball_v[1]), length(vx, vy)
-    top = min(100.0 * c.dash_power_rate / (1.0 - c.player_decay), c.player_speed_max)
-    head_start = c.kickable_distance + own / (1.0 - c.player_decay)
+    lead = c.kickable_distance + length(vx, vy) * c.player_roll[ROLL_CYCLES - 1]
     i = 0
     while i < 2 * c.intercept_horizon:
         roll = c.ball_roll[i]
         rel_x, rel_y = ball[0] + roll * ball_v[0] - x, ball[1] + roll * ball_v[1] - y
-        gap = (length(rel_x, rel_y) - head_start) / top - i
+        distance = length(rel_x, rel_y)
+        gap = distance - lead - c.top_speed * i
         if gap <= 0.0:
             return i
-        i += max(int(gap / (1.0 + speed)), 1)
+        coming = max(-(rel_x * ball_v[0] + rel_y * ball_v[1]) / distance, 0.0)
+        i += max(int(gap / (c.top_speed + coming * _left_of_speed(c, roll))), 1)
     return i
+
+
+@compiled
+def _left_of_speed(c, roll):
+    """Share of its speed that a ball has after rolling `roll` times its first speed."""
+    return 1.0 - (1.0 - c.ball_decay) * roll

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.compiled import compiled
-from keepaway_sim.config import NEVER
-from keepaway_sim.geometry import TWO_PI, length, quantize, wrap
+from keepaway_sim.config import NEVER, SIGHT_CELLS
+from keepaway_sim.geometry import TWO_PI, bearing, length, quantize, rotated, wrap
 from keepaway_sim.physics import dash_acceleration, kick_acceleration, limited
 from keepaway_sim.streams import draw
 
@@ -379,19 +379,24 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         yaw_error = (2.0 * draw(uniforms, cursor, f) - 1.0) * c.self_yaw_error
     s.body[f, p, p] = wrap(yaw[p] + yaw_error)
     face = yaw[p] + s.neck[f, p]
+    error = math.cos(yaw_error), math.sin(yaw_error)
+    believed_face = math.cos(face + yaw_error), math.sin(face + yaw_error)
     for j in range(num + 1):
         if j == p:
             continue
         dx, dy = position[j, 0] - position[p, 0], position[j, 1] - position[p, 1]
-        distance = length(dx, dy)
-        direction = wrap(math.atan2(dy, dx) - face)
+        distance = max(length(dx, dy), 1e-6)
+        dx, dy = dx / distance, dy / distance
+        direction = wrap(bearing(dx, dy) - face)
         seen = abs(direction) <= 0.5 * c.visible_angle
         if not seen and distance > c.feel_distance:
             continue
-        _see(
-            c, s, velocity, f, p, j, dx, dy, distance, direction, seen,
-            face + yaw_error, yaw_error, uniforms, cursor,
-        )  # fmt: skip
+        if c.direction_step == 0.0:
+            ux, uy = rotated(dx, dy, *error)
+        else:
+            step = int(round(direction / c.direction_step)) + len(c.direction_cosine) // 2
+            ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
+        _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, uniforms, cursor)
         if seen and j < num:
             s.body[f, p, j] = wrap(yaw[j] + yaw_error)
     own, ball = s.position[f, p, p], s.position[f, p, num]
@@ -400,18 +405,19 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
 
 
 @compiled
-def _see(
-    c, s, velocity, f, p, j, dx, dy, distance, direction, seen, face, yaw_error, uniforms, cursor
-):
-    """Object j as seen (with velocity) or only felt by player p; `face` as p believes it."""
+def _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, uniforms, cursor):
+    """Object j as seen (with velocity) or only felt by player p.
+
+    Args:
+        dx, dy, distance: unit vector to the object and how far it is [m].
+        ux, uy: the unit vector as player p believes it.
+    """
     reported = _reported_distance(c, distance)
-    angle = face + quantize(direction, c.direction_step)
-    cosine, sine = math.cos(angle), math.sin(angle)
     ball = c.num_keepers + c.num_takers
     fresh = s.age[f, p, j] <= 1
     old_x, old_y = s.position[f, p, j, 0], s.position[f, p, j, 1]
-    s.position[f, p, j, 0] = s.position[f, p, p, 0] + reported * cosine
-    s.position[f, p, j, 1] = s.position[f, p, p, 1] + reported * sine
+    s.position[f, p, j, 0] = s.position[f, p, p, 0] + reported * ux
+    s.position[f, p, j, 1] = s.position[f, p, p, 1] + reported * uy
     s.age[f, p, j] = 0
     if not seen:
         if j == ball and fresh:  # P: velocity of a felt ball from two positions
@@ -421,15 +427,12 @@ def _see(
     if not _velocity_visible(c, distance, uniforms, cursor, f):
         return
     wx, wy = velocity[j, 0] - velocity[p, 0], velocity[j, 1] - velocity[p, 1]
-    if distance > 0.0:
-        dx, dy = dx / distance, dy / distance
-    radial = reported * quantize((wx * dx + wy * dy) / max(distance, 1e-6), c.change_step)
-    turning = (dx * wy - dy * wx) / max(distance, 1e-6)
+    radial = reported * quantize((wx * dx + wy * dy) / distance, c.change_step)
+    turning = (dx * wy - dy * wx) / distance
     if c.change_step > 0.0:
         turning = quantize(turning, DIRECTION_CHANGE_STEP)
-    across = reported * turning
-    vx = velocity[p, 0] + radial * cosine - across * sine
-    vy = velocity[p, 1] + radial * sine + across * cosine
+    rel_vx, rel_vy = rotated(radial, reported * turning, ux, uy)
+    vx, vy = velocity[p, 0] + rel_vx, velocity[p, 1] + rel_vy
     if j == ball:
         vx, vy = _blended(c, vx, vy, s.velocity[f, p, j, 0], s.velocity[f, p, j, 1])
     s.velocity[f, p, j, 0], s.velocity[f, p, j, 1] = vx, vy
@@ -437,11 +440,13 @@ def _see(
 
 @compiled
 def _reported_distance(c, distance):
-    """S: the logarithm is rounded, then the distance itself, to quantize_step."""
+    """The distance as the server reports it, see `config._sight_tables`."""
     if c.quantize_step == 0.0:
         return distance
-    rough = math.exp(quantize(math.log(max(distance, 1e-6)), c.quantize_step))
-    return quantize(rough, 0.1)
+    edge = c.sight_first[min(int(distance * SIGHT_CELLS), len(c.sight_first) - 1)]
+    while distance >= c.sight_edge[edge]:
+        edge += 1
+    return c.sight_value[edge]
 
 
 @compiled
