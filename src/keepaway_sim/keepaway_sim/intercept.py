@@ -72,6 +72,14 @@ def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
 
 
 @compiled
+def _faces(c, rel_x, rel_y, vx, vy, ux, uy):
+    """Does a point lie so well ahead that `heading_to_go` would not turn? (Cheap; misses some.)"""
+    rel_x, rel_y = rel_x - vx, rel_y - vy
+    ahead = ux * rel_x + uy * rel_y
+    return ahead > 0.0 and abs(ux * rel_y - uy * rel_x) <= 0.9 * c.kickable_distance
+
+
+@compiled
 def _off(ux, uy, rel_x, rel_y, rest, allowed, back_distance):
     """Does a point lie too far off the line of a body, or too far behind it?"""
     behind = ux * rel_x + uy * rel_y < 0.0
@@ -202,8 +210,11 @@ def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
     """Cycles a player needs to bring a point within kicking distance (turns included)."""
     cycles = 0
     for _ in range(5):
-        if length(to_x - x, to_y - y) < c.kickable_distance:
+        rel_x, rel_y = to_x - x, to_y - y
+        if length(rel_x, rel_y) < c.kickable_distance:
             return cycles
+        if _faces(c, rel_x, rel_y, vx, vy, ux, uy):
+            break
         turns, ux, uy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)
         if not turns:
             break
