@@ -99,6 +99,7 @@ class Scene:
                     math.sin(self.yaw[j]),
                     self.position[-1],
                     self.velocity[-1],
+                    2 * self.c.intercept_horizon - 1,
                 )
 
     def command(self, name: str, action: int, target: str = "1") -> tuple[float, float, float]:

@@ -16,6 +16,7 @@ approx = pytest.approx
 
 C = pack(Task(), profile("2005"))
 ZERO = np.zeros(2)
+LIMIT = 2 * C.intercept_horizon - 1  # [cycles]
 
 
 @pytest.mark.parametrize(
@@ -102,7 +103,7 @@ def test_way_left_after_running_straight(cycles, left):
 
 def to_ball(x, y, ball, ball_v):
     args = C, float(x), float(y), 0.0, 0.0, 1.0, 0.0, np.array(ball, float), np.array(ball_v, float)
-    return intercept.cycles_to_ball(*args)
+    return intercept.cycles_to_ball(*args, LIMIT)
 
 
 def test_a_ball_that_comes_is_reached_sooner():
@@ -140,7 +141,9 @@ def test_skipping_cycles_finds_the_first_in_which_the_ball_is_reached():
             if needed <= i:
                 expected = needed
                 break
-        assert intercept.cycles_to_ball(C, *player, ball, ball_v) == expected
+        assert intercept.cycles_to_ball(C, *player, ball, ball_v, LIMIT) == expected
+        if expected < NEVER:
+            assert intercept.cycles_to_ball(C, *player, ball, ball_v, expected - 1) == NEVER
 
 
 def test_skipping_cycles_finds_the_first_meeting_point():

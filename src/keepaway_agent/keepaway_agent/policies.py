@@ -75,7 +75,7 @@ class View(NamedTuple):
 
     position: np.ndarray  # (num_players + 1, 2) [m] players in match order, then the ball
     age: np.ndarray  # (num_players + 1,) [cycles] since each was last perceived
-    cycles_to_ball: np.ndarray  # (num_players,) of team-mates, UNREACHABLE where not known
+    cycles_to_ball: np.ndarray  # (num_players,) of the fastest of the team, else UNREACHABLE
     ball_kickable: bool
     cycle: int  # since kick-off
 

@@ -203,7 +203,7 @@ class Track(NamedTuple):
     age: np.ndarray  # (T, P, P + 1) [cycles] how old that is
     kickable: np.ndarray  # (T, P) bool: believes that it can kick the ball
     due: np.ndarray  # (T, P) bool: has to decide
-    cycles_to_ball: np.ndarray  # (T, P, P) [cycles] of itself and its team-mates; NEVER
+    cycles_to_ball: np.ndarray  # (T, P, P) [cycles] of the fastest of its team; else NEVER
     requested: np.ndarray  # (T, P) what was asked for in answer to this cycle; -1: nothing
     requested_target: np.ndarray  # (T, P)
     values: np.ndarray  # (T, P, num_keepers) action values of learners

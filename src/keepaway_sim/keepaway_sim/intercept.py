@@ -150,7 +150,7 @@ def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old)
     first, first_x, first_y = NEVER, 0.0, 0.0
     kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
     speed = length(ball_v[0], ball_v[1])
-    i = _straight_run(c, x, y, vx, vy, ball, ball_v)
+    i = _straight_run(c, x, y, vx, vy, ball, ball_v, c.intercept_horizon)
     while i <= c.intercept_horizon:
         roll = c.ball_roll[i]
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
@@ -225,17 +225,18 @@ def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
 
 
 @compiled
-def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
-    """Cycles a player needs to reach the moving ball; NEVER beyond the horizon.
+def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v, limit):
+    """Cycles a player needs to reach the moving ball; NEVER if that takes more than `limit`.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
     (P: getFastestInSetTo). Cycles are skipped in which it cannot be.
     """
     speed = length(ball_v[0], ball_v[1])
     if speed < STILL:
-        return cycles_to_point(c, x, y, vx, vy, ux, uy, ball[0], ball[1])
-    i = _straight_run(c, x, y, vx, vy, ball, ball_v)
-    while i < 2 * c.intercept_horizon:
+        needed = cycles_to_point(c, x, y, vx, vy, ux, uy, ball[0], ball[1])
+        return needed if needed <= limit else NEVER
+    i = _straight_run(c, x, y, vx, vy, ball, ball_v, limit)
+    while i <= limit:
         roll = c.ball_roll[i]
         bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
         needed = cycles_to_point(c, x, y, vx, vy, ux, uy, bx, by)
@@ -246,15 +247,17 @@ def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v):
 
 
 @compiled
-def _straight_run(c, x, y, vx, vy, ball, ball_v):
+def _straight_run(c, x, y, vx, vy, ball, ball_v, limit):
     """Cycles before which nobody reaches the ball, even running straight without a turn.
+
+    Beyond `limit` it is not looked for.
 
     The distance to a ball on a straight line is a convex function of the way it has rolled, so
     it falls by no more than it falls now; cycles in which it cannot have fallen enough are skipped.
     """
     lead = c.kickable_distance + length(vx, vy) * c.player_roll[ROLL_CYCLES - 1]
     i = 0
-    while i < 2 * c.intercept_horizon:
+    while i <= limit:
         roll = c.ball_roll[i]
         rel_x, rel_y = ball[0] + roll * ball_v[0] - x, ball[1] + roll * ball_v[1] - y
         distance = length(rel_x, rel_y)

@@ -467,9 +467,9 @@ def go_to_ball(c, s, m, f, p):
     ball = c.num_keepers + c.num_takers
     bx, by = s.position[f, p, ball]
     if p >= c.num_keepers:
-        if s.ball_kickable[f, p] and _nearest_to_ball(c, s, f, p, c.num_keepers) == p:
+        if s.ball_kickable[f, p] and nearest_to_ball(c, s, f, p, c.num_keepers, ball) == p:
             return hold_ball(c, s, f, p, c.taker_hold_distance)
-        nearest = _nearest_to_ball(c, s, f, p, 0)
+        nearest = nearest_to_ball(c, s, f, p, 0, ball)
         if nearest != p and nearest >= c.num_keepers:
             ox, oy = s.position[f, p, nearest]
             if length(ox - bx, oy - by) < c.kickable_distance:
@@ -479,11 +479,11 @@ def go_to_ball(c, s, m, f, p):
 
 
 @compiled
-def _nearest_to_ball(c, s, f, p, first):
-    """The known player of first.. believed nearest to the ball; p itself counts always."""
+def nearest_to_ball(c, s, f, p, first, last):
+    """The known player of first..last-1 believed nearest to the ball; p itself counts always."""
     ball = c.num_keepers + c.num_takers
     nearest, best = -1, math.inf
-    for j in range(first, c.num_keepers + c.num_takers):
+    for j in range(first, last):
         if j != p and s.age[f, p, j] > c.player_lost_age:
             continue
         dx = s.position[f, p, j, 0] - s.position[f, p, ball, 0]

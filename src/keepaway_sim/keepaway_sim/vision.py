@@ -48,7 +48,7 @@ class Perceptions(NamedTuple):
     age: np.ndarray  # (F, P, P + 1) int32 [cycles] since seen, felt or heard of; NEVER
     body: np.ndarray  # (F, P, P) [rad] body directions; own on the diagonal
     neck: np.ndarray  # (F, P) [rad] own neck relative to own body
-    cycles_to_ball: np.ndarray  # (F, P, P) int32 [cycles] of self and team-mates; NEVER
+    cycles_to_ball: np.ndarray  # (F, P, P) int32 [cycles] of the fastest of the team; else NEVER
     ball_kickable: np.ndarray  # (F, P) bool
     decision_due: np.ndarray  # (F, P) bool
     outcome: np.ndarray  # (F,) int8

@@ -394,11 +394,30 @@ def _judge(c, s, m, f, p):
     if s.ball_kickable[f, p]:
         s.cycles_to_ball[f, p, p] = 0
     elif known and p < c.num_keepers:
-        for j in range(c.num_keepers):
-            if j == p or s.age[f, p, j] <= c.player_lost_age:
-                x, y = s.position[f, p, j]
-                vx, vy = s.velocity[f, p, j]
-                ux, uy = math.cos(s.body[f, p, j]), math.sin(s.body[f, p, j])
-                s.cycles_to_ball[f, p, j] = cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v)
+        _find_fastest_keeper(c, s, f, p)
     passing = m.pass_cycle[f, p] == s.cycle[f] - 1 and s.ball_kickable[f, p]
     s.decision_due[f, p] = s.outcome[f] == _IN_PLAY and not passing
+
+
+@compiled
+def _find_fastest_keeper(c, s, f, p):
+    """Which keeper reaches the ball first, as player p believes, and when (equal ones all count).
+
+    Begins with the keeper nearest to the ball, so that most others are soon seen to be slower.
+    """
+    ball = c.num_keepers + c.num_takers
+    nearest = skills.nearest_to_ball(c, s, f, p, 0, c.num_keepers)
+    fastest = 2 * c.intercept_horizon - 1
+    for k in range(c.num_keepers):
+        j = (nearest + k) % c.num_keepers
+        if j != p and s.age[f, p, j] > c.player_lost_age:
+            continue
+        x, y = s.position[f, p, j]
+        vx, vy = s.velocity[f, p, j]
+        ux, uy = math.cos(s.body[f, p, j]), math.sin(s.body[f, p, j])
+        place, motion = s.position[f, p, ball], s.velocity[f, p, ball]
+        cycles = cycles_to_ball(c, x, y, vx, vy, ux, uy, place, motion, fastest)
+        if cycles < fastest:
+            fastest = cycles
+            s.cycles_to_ball[f, p, :] = NEVER
+        s.cycles_to_ball[f, p, j] = cycles
