@@ -25,7 +25,8 @@ TYPICAL_TARGET_EPISODES = 4000  # to weigh trials in the estimate of the time le
 def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...]]:
     """The trials that are left, in batches of about `batch` that are played together.
 
-    Rows that share their trials' source runs stay together, so that those are played once.
+    Rows that share their trials' source runs stay together, so that those are played once. All
+    rows get on at the same pace: a study that is stopped early has about as many trials of each.
 
     >>> from keepaway_transfer.study import load_study
     >>> plan(load_study("tiny"), done={("0", 1)}, batch=4)[:2]
@@ -42,8 +43,8 @@ def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...
     else:
         groups = [
             [(name, number) for number in some]
-            for name in names
             for some in _chunks(numbers, batch)
+            for name in names
         ]
     left = [tuple(key for key in group if key not in done) for group in groups]
     return [group for group in left if group]
