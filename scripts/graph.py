@@ -30,7 +30,7 @@ def main() -> int:
     rclpy.init(args=[])
     node = Node("graph_inspector", start_parameter_services=False, enable_rosout=False)
     try:
-        time.sleep(args.wait)
+        discover(node, args.wait)
         if args.topic:
             return echo(node, args.topic, args.count)
         print_graph(node, args.all)
@@ -42,6 +42,17 @@ def main() -> int:
     finally:
         rclpy.try_shutdown()
     return 0
+
+
+def discover(node: Node, quiet: float) -> None:
+    """Wait until nobody and nothing new has turned up for so long [s]."""
+    found, since = -1, time.monotonic()
+    while time.monotonic() - since < quiet:
+        names, topics = node.get_node_names_and_namespaces(), node.get_topic_names_and_types()
+        talk = sum(node.count_publishers(t) + node.count_subscribers(t) for t, _ in topics)
+        if len(names) + talk != found:
+            found, since = len(names) + talk, time.monotonic()
+        time.sleep(0.1)
 
 
 def print_graph(node: Node, show_all: bool) -> None:
@@ -92,7 +103,9 @@ def parse() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--domain", type=int, help="ROS domain (default: the environment's)")
-    parser.add_argument("--wait", type=float, default=1.5, help="to find everybody [s]")
+    parser.add_argument(
+        "--wait", type=float, default=3.5, help="until nobody new has come for so long [s]"
+    )
     parser.add_argument("--all", action="store_true", help="what every node has, too")
     parser.add_argument("--topic", help="print what is said on this topic instead")
     parser.add_argument("--count", type=int, default=1, help="messages to print (default 1)")

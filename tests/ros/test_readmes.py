@@ -103,7 +103,9 @@ def start(
         node = documented.make(
             context=graph.context, cli_args=arguments, use_global_arguments=False
         )
-        started.append(graph.add(node))
+        started.append(node)
+        if not isinstance(node, Recorder):  # who takes its messages itself
+            graph.add(node)
         if documented.hears_match:
             graph.spin_until(lambda: _knows_players(node))
         return node

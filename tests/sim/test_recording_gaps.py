@@ -82,6 +82,21 @@ def test_players_that_never_answer_do_not_fill_the_memory(recorded: list[Recorde
     assert counter.unanswered_decisions()[0] in (due, due - 1)
 
 
+def test_a_match_that_was_on_is_counted_from_when_every_topic_was_heard(
+    recorded: list[Recorded],
+) -> None:
+    """A recorder finds one topic after the other; only what it then misses is a loss."""
+    begin = {"/keeper_2/perception": 900_000_000, "/field_state": 500_000_000}
+    late = [m for m in recorded if m.log_time >= begin.get(m.topic, 700_000_000)]
+    counter = counted(late)
+    assert counter.start() == 900_000_000
+    assert set(counter.missing().values()) == {0}
+    assert counter.report().startswith("joined at 0.9 s, since then ")
+    lost = nth(late, "/keeper_2/perception", 3)
+    counter = counted([m for m in late if m is not lost])
+    assert "/keeper_2/perception misses 1 cycles" in counter.report()
+
+
 def test_selected_episodes_are_no_gaps(recorded: list[Recorded]) -> None:
     ends = [m.log_time for m in recorded if m.topic == "/episode"]
     kept = [m for m in recorded if not ends[0] < m.log_time <= ends[1]]

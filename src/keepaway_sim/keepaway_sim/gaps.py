@@ -2,7 +2,8 @@
 
 Perceptions and field states are stamped with simulated time and come once a cycle, so a step of
 their stamps by more than one cycle names what is missing. A request is missed if a decision was
-due and nobody answered.
+due and nobody answered. A match begins at time 0: a recording that was joined to one that was on
+is counted from the first cycle in which every topic was heard, and its report says which.
 """
 
 from __future__ import annotations
@@ -64,14 +65,19 @@ class GapCounter:
             player, episode, cycle = _ACTION_REQUEST.unpack_from(data)
             self._pair(player, (episode, cycle), False)
 
+    def start(self) -> int:
+        """Simulated time [ns] from which on every cycle is expected of every topic."""
+        first = [count.first for count in self.topics.values() if count.received]
+        return max(first) if min(first, default=0) > 0 else 0
+
     def missing(self) -> dict[str, int]:
         """Cycles missing by topic, those before its first and after its last message included."""
         seen = [count for count in self.topics.values() if count.received]
-        start = min((count.first for count in seen), default=0)
+        start = self.start()
         end = max((count.last for count in seen), default=0)
         whole = (end - start) // CYCLE_NS + 1 if seen else 0
         return {
-            name: count.missing + (count.first - start + end - count.last) // CYCLE_NS
+            name: count.missing + (max(0, count.first - start) + end - count.last) // CYCLE_NS
             if count.received
             else whole
             for name, count in self.topics.items()
@@ -92,7 +98,9 @@ class GapCounter:
         received = sum(count.received for count in self.topics.values())
         parts = [f"{name} misses {count} cycles" for name, count in missing.items()]
         parts += [f"player {player} left {count} decisions open" for player, count in late.items()]
-        return "; ".join(parts) or f"nothing is missing of {received} perceptions and states"
+        report = "; ".join(parts) or f"nothing is missing of {received} perceptions and states"
+        joined = self.start() / 1e9
+        return f"joined at {joined:.1f} s, since then {report}" if joined else report
 
     def complete_until(self) -> int:
         """Simulated time [ns] that every topic that comes each cycle has reached; -1: none yet."""
