@@ -135,8 +135,6 @@ class Match:
                 recorded.append(int(reader.codec(message.topic).decode(message.data)["number"]))
         if len(set(recorded)) != len(recorded) or not set(recorded) <= played:
             raise LossError(f"the bags hold episodes {recorded}")
-        if not all(BagReader(path).message_count for path in folder.glob("repaired_*")):
-            raise LossError("a bag without a message")
         return len(bags), len(recorded)
 
     def end(self) -> dict[str, object]:

@@ -92,7 +92,7 @@ class Codec:
             raise KeepawayError(f"{self.message_type}: not little-endian CDR: {data[:4]!r}")
         try:
             return self._read(_Cursor(data), self._root)
-        except (struct.error, UnicodeDecodeError) as error:
+        except (struct.error, UnicodeDecodeError, RecursionError) as error:
             raise KeepawayError(f"{len(data)} bytes are no {self.message_type}: {error}") from error
 
     def dtype(self, lengths: Mapping[str, int], size: int = 0) -> np.dtype[np.void]:
@@ -169,6 +169,7 @@ class Codec:
                 values[field.name] = self._read_one(cursor, field.type)
                 continue
             count = cursor.unpack(_COUNT) if field.size is None else field.size
+            cursor.check_count(count)
             if field.type in _PRIMITIVES:
                 values[field.name] = cursor.unpack_many(_PRIMITIVES[field.type], count)
             else:
@@ -203,7 +204,7 @@ class Codec:
                 yield from self._leaves(self._messages[field.type], f"{name}.", lengths)
 
 
-@functools.cache
+@functools.lru_cache(maxsize=256)
 def codec(message_type: str, definition_text: str | None = None) -> Codec:
     """The codec of a message type, by an installed definition or by the one that is given.
 
@@ -334,6 +335,11 @@ class _Cursor:
         start = _aligned(self._position, number.size)
         self._position = start + count * number.size
         return list(struct.unpack_from(f"<{count}{number.format[1:]}", self._data, start))
+
+    def check_count(self, count: int) -> None:
+        """Refuse a sequence that is longer than the message has bytes."""
+        if count > len(self._data):
+            raise struct.error(f"a sequence of {count} in a message of {len(self._data)} bytes")
 
     def string(self) -> str:
         length = self.unpack(_COUNT)

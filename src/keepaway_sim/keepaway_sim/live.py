@@ -69,9 +69,15 @@ class LiveMatch:
             the names of the players, if it was a Match that tells them.
 
         Raises:
-            KeepawayError: bytes that are not such a message.
+            KeepawayError: bytes that are not such a message, or not one of this match.
         """
         said = codec(message_type).decode(data)
+        try:
+            return self._hear(message_type, said)
+        except (ValueError, IndexError) as error:
+            raise KeepawayError(f"a {message_type} that makes no sense here: {error}") from error
+
+    def _hear(self, message_type: str, said: dict[str, Any]) -> list[str]:
         if message_type == messages.MATCH:
             return self._begin(said)
         if self._task is None:

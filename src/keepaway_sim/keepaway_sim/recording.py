@@ -40,6 +40,7 @@ from keepaway_sim.version import __version__
 INFO = "keepaway"
 """Name of the MCAP metadata records that say what made a bag."""
 CHUNK_SIZE = 768 * 1024  # [bytes] as rosbag2's
+MAX_CHUNK_SIZE = 2**28  # [bytes] unpacked; no writer makes larger ones by default
 COMPRESSIONS = {
     "zstd": CompressionType.ZSTD,
     "lz4": CompressionType.LZ4,
@@ -400,9 +401,8 @@ class BagReader:
         """The messages of these topics (or of all) with start <= log_time < end [ns]."""
         for file, chunk in self._chunks(start, end):
             data, index = file.unpack(chunk)
-            channels = file.channels
             for channel, log_time, first, last in index.tolist():
-                topic = channels[channel]
+                topic = file.topic(channel)
                 if topics is not None and topic.name not in topics:
                     continue
                 if (start is None or log_time >= start) and (end is None or log_time < end):
@@ -426,7 +426,7 @@ class BagReader:
             index = index[(index[:, 1] >= low) & (index[:, 1] < high)]
             raw = np.frombuffer(data, np.uint8)
             for channel in np.unique(index[:, 0]):
-                topic = file.channels[int(channel)]
+                topic = file.topic(int(channel))
                 if topic.name in topics:
                     of_topic = index[index[:, 0] == channel]
                     for same in _runs_of_equal_size(of_topic):
@@ -498,7 +498,7 @@ class _File:
         self._counts: dict[int, int] = {}
         self._schemas: dict[int, Schema] = {}
         self._attachments: list[tuple[int, int]] = []
-        with path.open("rb") as stream:
+        with _understanding(path), path.open("rb") as stream:
             self._scan(stream, path.stat().st_size)
 
     def contents(self) -> Iterator[tuple[Topic, int]]:
@@ -511,34 +511,41 @@ class _File:
         for number, topic in self.channels.items():
             yield topic, self._counts.get(number, 0)
 
+    def topic(self, channel: int) -> Topic:
+        """The topic of a channel.
+
+        Raises:
+            KeepawayError: there is no such channel.
+        """
+        if channel not in self.channels:
+            raise KeepawayError(f"{self.path}: a message of channel {channel}, which is not there")
+        return self.channels[channel]
+
     def unpack(self, chunk: _Chunk) -> tuple[bytes, np.ndarray]:
         """A chunk's bytes, and (n, 4) where its messages are: channel, time, first, last byte.
 
         Raises:
             KeepawayError: a chunk that is not what was written.
         """
-        with self.path.open("rb") as stream:
+        with _understanding(self.path), self.path.open("rb") as stream:
             stream.seek(chunk.offset)
-            packed = stream.read(chunk.length)
-        try:
-            data = _decompress(chunk, packed)
-        except (RuntimeError, zstandard.ZstdError) as error:
-            raise KeepawayError(f"{self.path}: chunk at {chunk.offset}: {error}") from error
-        if chunk.crc and zlib.crc32(data) != chunk.crc:
-            raise KeepawayError(f"{self.path}: the chunk at {chunk.offset} is damaged")
-        records = _index_records(np.frombuffer(data, np.uint8))
-        messages = records[records[:, 0] == Opcode.MESSAGE, 1:]
-        if not self.complete:
-            for opcode, _, _, first, last in records[records[:, 0] != Opcode.MESSAGE].tolist():
-                self._read_definition(opcode, data[first:last])
+            data = _decompress(chunk, stream.read(chunk.length))
+            records, is_whole = _index_records(np.frombuffer(data, np.uint8))
+            if not is_whole or (chunk.crc and zlib.crc32(data) != chunk.crc):
+                raise KeepawayError(f"{self.path}: the chunk at {chunk.offset} is damaged")
+            messages = records[records[:, 0] == Opcode.MESSAGE, 1:]
+            if not self.complete:
+                for opcode, _, _, first, last in records[records[:, 0] != Opcode.MESSAGE].tolist():
+                    self._read_definition(opcode, data[first:last])
         return data, messages
 
     def attachments(self) -> Iterator[tuple[str, bytes]]:
         """Name and contents of every attached file."""
         with self.path.open("rb") as stream:
             for offset, length in self._attachments:
-                stream.seek(offset)
-                found = Attachment.read(ReadDataStream(io.BytesIO(stream.read(length))))
+                with _understanding(self.path):
+                    stream.seek(offset)
+                    found = Attachment.read(ReadDataStream(io.BytesIO(stream.read(length))))
                 yield found.name, found.data
 
     def _scan(self, stream: IO[bytes], size: int) -> None:
@@ -552,7 +559,7 @@ class _File:
             if opcode == 0 or position > size:
                 return  # here the writer was killed
             if opcode == Opcode.CHUNK:
-                self.chunks.append(_read_chunk(stream))
+                self.chunks.append(_read_chunk(stream, position))
             elif opcode == Opcode.ATTACHMENT:
                 self._attachments.append((stream.tell(), length))
             elif opcode in (Opcode.METADATA, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
@@ -639,34 +646,56 @@ def _topic(channel: Channel, schema: Schema) -> Topic:
     return Topic(channel.topic, schema.name, schema.data.decode(), hash_, qos)
 
 
-def _read_chunk(stream: IO[bytes]) -> _Chunk:
+@contextlib.contextmanager
+def _understanding(path: Path) -> Iterator[None]:
+    """Whatever a stranger's bytes break is said to be the file's fault."""
+    try:
+        yield
+    except (KeepawayError, OSError):
+        raise
+    except Exception as error:
+        raise KeepawayError(f"{path} is damaged: {error!r}") from error
+
+
+def _read_chunk(stream: IO[bytes], limit: int) -> _Chunk:
+    """Where a chunk is whose record ends at `limit`."""
     start, end, size, crc, length = struct.unpack("<QQQII", stream.read(32))
-    compression = stream.read(length).decode()
+    compression = stream.read(min(length, limit)).decode()
     (packed,) = struct.unpack("<Q", stream.read(8))
+    if size > MAX_CHUNK_SIZE or stream.tell() + packed > limit:
+        raise KeepawayError(f"a chunk of {size} bytes, {packed} of them packed")
     return _Chunk(start, end, size, crc, compression, stream.tell(), packed)
 
 
 def _decompress(chunk: _Chunk, packed: bytes) -> bytes:
+    data = packed
     if chunk.compression == "zstd":
-        return zstandard.decompress(packed, chunk.size)
-    if chunk.compression == "lz4":
-        return bytes(lz4.frame.decompress(packed))
-    if chunk.compression:
-        raise RuntimeError(f"compression {chunk.compression!r} is not known")
-    return packed
+        if zstandard.frame_content_size(packed) > chunk.size:
+            raise KeepawayError("a chunk larger than it says")
+        data = zstandard.decompress(packed, chunk.size)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(packed, chunk.size)
+    elif chunk.compression:
+        raise KeepawayError(f"compression {chunk.compression!r} is not known")
+    if len(data) != chunk.size:
+        raise KeepawayError(f"a chunk of {len(data)} bytes that should have {chunk.size}")
+    return data
 
 
 @njit(cache=True)
 def _index_records(data):
     """(n, 5) int64 of every record in a chunk: opcode, channel, log time, first and last byte.
 
-    Channel and time are of messages; their first byte is the payload's.
+    Channel and time are of messages; their first byte is the payload's. With it: are the records
+    whole, up to the last byte?
     """
     found = np.empty((len(data) // 9 + 1, 5), np.int64)
     count, position = 0, 0
     while position + 9 <= len(data):
         length = _unsigned(data, position + 1, 8)
         body = position + 9
+        if length < 0 or length > len(data) - body or (data[position] == 5 and length < 22):
+            return found[:count].copy(), False
         found[count, 0] = data[position]
         is_message = data[position] == 5
         found[count, 1] = _unsigned(data, body, 2) if is_message else 0
@@ -675,7 +704,7 @@ def _index_records(data):
         found[count, 4] = body + length
         position = body + length
         count += 1
-    return found[:count].copy()
+    return found[:count].copy(), position == len(data)
 
 
 @njit(cache=True, inline="always")

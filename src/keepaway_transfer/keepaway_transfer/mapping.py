@@ -21,6 +21,7 @@ import numpy as np
 
 from keepaway_agent.actions import Role, keeper_action_names
 from keepaway_agent.features import feature_names
+from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError
 
@@ -94,10 +95,12 @@ def load_mapping(path: Path | str) -> InterTaskMapping:
         return InterTaskMapping(data["source"], data["target"], data["chi_x"], data["chi_a"])
     except KeyError as missing:
         raise MappingError(f"{path}: {missing} is missing") from missing
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise MappingError(f"{path}: not a TOML file: {error}") from error
-    except MappingError as error:
+    except KeepawayError as error:
         raise MappingError(f"{path}: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise MappingError(f"{path}: not a TOML file: {error}") from error
+    except (TypeError, AttributeError) as error:
+        raise MappingError(f"{path}: a value of another type than needed: {error}") from error
 
 
 def rho_mapping(source: str, target: str) -> InterTaskMapping:

@@ -66,8 +66,13 @@ def read_results(folder: Path | str) -> Results:
         StudyError: no results there, or a line that is no trial, with its number.
     """
     head = _read_head(Path(folder))
-    trials = tuple(_read_trials(Path(folder)))
-    return Results(study_from(head["study"]), head["command"], head["code_version"], trials)
+    try:
+        trials = tuple(_read_trials(Path(folder)))
+        return Results(study_from(head["study"]), head["command"], head["code_version"], trials)
+    except StudyError:
+        raise
+    except (KeyError, ValueError) as error:
+        raise StudyError(f"{folder} holds no results: {error!r}") from error
 
 
 class ResultsFolder:
@@ -147,8 +152,10 @@ def _read_head(folder: Path) -> dict[str, Any]:
         head: dict[str, Any] = json.loads((folder / STUDY_FILE).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise StudyError(f"{folder} holds no results: it has no {STUDY_FILE}") from None
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise StudyError(f"{folder / STUDY_FILE}: {error}") from error
+    if not isinstance(head, dict):
+        raise StudyError(f"{folder / STUDY_FILE}: not a JSON object")
     return head
 
 
@@ -166,7 +173,7 @@ def _trial_from(line: str, where: str) -> Trial:
         data["sources"] = tuple(SourceRun(**source) for source in data["sources"])
         data["cycles"], data["greedy_cycles"] = tuple(data["cycles"]), tuple(data["greedy_cycles"])
         return Trial(**data)
-    except (KeyError, TypeError, json.JSONDecodeError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise StudyError(f"{where}: {error}") from error
 
 

@@ -117,7 +117,7 @@ def load_study(name: str | Path) -> Study:
     except FileNotFoundError:
         known = ", ".join(sorted(file.stem for file in FOLDER.glob("*.toml")))
         raise StudyError(f"{path}: no such study; there are {known}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise StudyError(f"{path}: {error}") from error
 
 
@@ -133,7 +133,7 @@ def study_from(data: Mapping[str, Any]) -> Study:
         return Study(rows=rows, references=tuple(rest.pop("references")), **rest)
     except KeyError as missing:
         raise StudyError(f"{missing} is missing") from missing
-    except TypeError as error:
+    except (TypeError, AttributeError) as error:
         raise StudyError(f"not the settings of a study: {error}") from error
 
 
