@@ -153,6 +153,11 @@ def trial_seed(seed: int, number: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(seed, spawn_key=(number,))
 
 
+def child_seed(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:
+    """A child of a trial's seed sequence: (0,) is the world's, (1, p) the policy of player p."""
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *key))
+
+
 class Trainer:
     """Plays trials, `num_fields` at a time.
 
@@ -233,13 +238,13 @@ class Trainer:
         for player in range(task.num_players):
             policy = trial.keeper_policy if player < task.num_keepers else trial.taker_policy
             self._policy[number, player] = make_player(player, task.num_keepers, policy).policy
-            generator = np.random.default_rng(_child(trial.seed, 1, player))
+            generator = np.random.default_rng(child_seed(trial.seed, 1, player))
             self._streams.seed(number * task.num_players + player, generator)
         self._teams[Role.KEEPER].prepare(number, trial.keeper_policy, trial.keeper_weights)
         self._teams[Role.TAKER].prepare(number, trial.taker_policy, trial.taker_weights)
         self._lives[number] = _Life(trial)
         self._cycles_left[number] = trial.stop.max_cycles or _ENDLESS
-        self._world.start(number, _child(trial.seed, 0))
+        self._world.start(number, child_seed(trial.seed, 0))
         if trial.watch:
             self._watched.add(number)
 
@@ -411,10 +416,6 @@ class _Life:
         if stop.max_episodes is not None and len(self.durations) >= stop.max_episodes:
             return True
         return self.reached and self._cycles >= stop.min_cycles
-
-
-def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *key))
 
 
 @compiled
