@@ -97,6 +97,10 @@ def test_a_match_that_was_on_is_counted_from_when_every_topic_was_heard(
     assert "/keeper_2/perception misses 1 cycles" in counter.report()
 
 
+def test_hearing_nothing_is_not_called_complete() -> None:
+    assert GapCounter().report() == "no perception and no state was heard"
+
+
 def test_selected_episodes_are_no_gaps(recorded: list[Recorded]) -> None:
     ends = [m.log_time for m in recorded if m.topic == "/episode"]
     kept = [m for m in recorded if not ends[0] < m.log_time <= ends[1]]

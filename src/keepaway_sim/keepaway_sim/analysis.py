@@ -141,7 +141,7 @@ class Analyst:
             number=episode.number,
             start_s=episode.start / 1e9,
             cycles=episode.cycles,
-            duration_s=episode.duration,
+            duration_s=round(episode.duration, 6),
             outcome=episode.outcome.name.lower(),
             lost_by=self.bag.match["player_names"][by] if by >= 0 else "",
             lost_x=known.ball[0],

@@ -65,6 +65,11 @@ class GapCounter:
             player, episode, cycle = _ACTION_REQUEST.unpack_from(data)
             self._pair(player, (episode, cycle), False)
 
+    @property
+    def received(self) -> int:
+        """Perceptions and field states that came."""
+        return sum(count.received for count in self.topics.values())
+
     def start(self) -> int:
         """Simulated time [ns] from which on every cycle is expected of every topic."""
         first = [count.first for count in self.topics.values() if count.received]
@@ -95,10 +100,11 @@ class GapCounter:
         """In words, naming the topics that miss something."""
         missing = {name: count for name, count in self.missing().items() if count}
         late = {player: count for player, count in self.unanswered_decisions().items() if count}
-        received = sum(count.received for count in self.topics.values())
+        if not self.received:
+            return "no perception and no state was heard"
         parts = [f"{name} misses {count} cycles" for name, count in missing.items()]
         parts += [f"player {player} left {count} decisions open" for player, count in late.items()]
-        report = "; ".join(parts) or f"nothing is missing of {received} perceptions and states"
+        report = "; ".join(parts) or f"nothing is missing of {self.received} perceptions and states"
         joined = self.start() / 1e9
         return f"joined at {joined:.1f} s, since then {report}" if joined else report
 

@@ -223,8 +223,8 @@ def main(args: list[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM.
 
     Returns:
-        0 where nothing is missing, 1 where something is, 2 where nothing can be recorded (any
-        more).
+        0 where nothing is missing; 1 where something is, or nothing came; 2 where nothing can be
+        recorded, or no more.
     """
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stop = threading.Event()
@@ -243,7 +243,7 @@ def main(args: list[str] | None = None) -> int:
     except KeepawayError as error:
         recorder.get_logger().error(str(error))
         return 2
-    missing = any(recorder.gaps.missing().values())
+    missing = any(recorder.gaps.missing().values()) or not recorder.gaps.received
     log = recorder.get_logger().warning if missing else recorder.get_logger().info
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")
     rclpy.try_shutdown()
