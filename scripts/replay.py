@@ -7,8 +7,9 @@
 
 In a terminal the space bar pauses, the right arrow or . goes one cycle on, + and - change the
 rate, and q ends it. With the third line a keeper's node (scripts/keeper.py) answers what it would
-have done. --check plays nothing: the world and the players are made anew, and must do again what
-was recorded. What follows --ros-args goes to the node: -r __ns:=/again plays in a namespace.
+have done; --start-delay 10 gives it time to get ready, and with --rate 4 it keeps up. --check plays
+nothing: the world and the players are made anew, and must do again what was recorded. What follows
+--ros-args goes to the node: -r __ns:=/again plays in a namespace.
 """
 
 import argparse
