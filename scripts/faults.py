@@ -39,6 +39,7 @@ from keepaway_sim.recording import BagReader, repair
 SCRIPTS = Path(__file__).resolve().parent
 PATIENCE = 300.0  # [s] for the match to begin, to go on after a fault, and to end
 LONGEST_FREEZE = 1.5  # [s]
+FAULTS_AN_EPISODE = 5  # at most: where nobody ever gets to play, nothing is tried
 
 
 class LossError(RuntimeError):
@@ -185,9 +186,12 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
     faults: Counter[str] = Counter()
     wait_for_episodes(executor, witness, 1)
     started = time.monotonic()
-    for _ in range(args.faults):
+    for number in range(args.faults):
         listen(executor, float(random.exponential(args.period)))
-        faults[hurt(match, random, executor, args.simulator_share)] += 1
+        fault = hurt(match, random, executor, args)
+        faults[fault] += 1
+        if fault == "simulator killed" or number % FAULTS_AN_EPISODE == 0:
+            wait_for_episodes(executor, witness, 1)
         match.check_weights()
         check_numbers(witness.numbers)
     wait_for_episodes(executor, witness, 3)
@@ -209,14 +213,16 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
     }
 
 
-def hurt(match: Match, random: np.random.Generator, executor: Executor, share: float) -> str:
+def hurt(
+    match: Match, random: np.random.Generator, executor: Executor, args: argparse.Namespace
+) -> str:
     """Kill or freeze one node; what was done, in words."""
     nodes = match.nodes()
     players = sorted(set(nodes) - {"simulator"})
-    hits_simulator = not players or random.random() < share
+    hits_simulator = not players or random.random() < args.simulator_share
     name = "simulator" if hits_simulator else str(random.choice(players))
     team = name.partition("_")[0]
-    is_kill = random.random() < 0.5
+    is_kill = random.random() < args.kill_share
     with contextlib.suppress(ProcessLookupError, KeyError):  # between its end and its new start
         os.kill(nodes[name], signal.SIGKILL if is_kill else signal.SIGSTOP)
         if not is_kill:
@@ -273,6 +279,7 @@ def parse() -> argparse.Namespace:
     add("--faults", type=int, default=300, help="how many (default 300)")
     add("--period", type=float, default=0.5, help="[s] between two, on average (default 0.5)")
     add("--simulator-share", type=float, default=0.1, help="of all faults (default 0.1)")
+    add("--kill-share", type=float, default=0.4, help="the rest freezes (default 0.4)")
     add("--task", default="3v2", help="keepers v takers (default 3v2)")
     add("--seed", type=int, default=0, help="of the match and of the faults (default 0)")
     add("--domain", type=int, default=73, help="ROS domain (default 73)")

@@ -407,7 +407,7 @@ def perceiver() -> Callable[[bytes], object]:
 
     def perceive(data: bytes) -> object:
         perceived = read_perception(data, facts.num_players, 0)
-        agent._moment = (-1, 0)  # whatever came before, this is new
+        agent.moment = (-1, 0)  # whatever came before, this is new
         decision = agent.perceive(perceived)
         if decision is not None:
             assert decision.action in (Action.HOLD_BALL, Action.PASS_BALL, *NOT_HOLDING)

@@ -19,7 +19,17 @@ PATIENT = {"answer_timeout": 20.0}
 
 
 def test_faults_at_random_moments_lose_nothing(ros_domain: int) -> None:
-    options = ["--faults", "8", "--simulator-share", "0.5", "--domain", str(ros_domain), "--json"]
+    options = [
+        "--faults",
+        "8",
+        "--simulator-share",
+        "0.5",
+        "--kill-share",
+        "0.5",
+        "--domain",
+        str(ros_domain),
+        "--json",
+    ]
     command = [sys.executable, str(ROOT / "scripts" / "faults.py"), *options]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -103,6 +103,7 @@ class Agent:
         has_learner: whether its policy asks the learner.
         episodes, hours: what it has played to the end [simulated h], loaded weights' included.
         cut_off: episodes that taught nothing: aborted, or their end was never perceived.
+        moment: episode and cycle that it perceived last.
     """
 
     def __init__(self, facts: MatchFacts, index: int, config: AgentConfig | None = None) -> None:
@@ -137,7 +138,7 @@ class Agent:
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
         self.has_learner = self._player.policy in (policies.LEARN, policies.GREEDY)
         self.episodes, self.hours, self.cut_off = 0, 0.0, 0
-        self._moment = (-1, 0)  # episode and cycle last perceived
+        self.moment = (-1, 0)
         self._in_play = False
         self._answer: Decision | None = None
         self._compile()
@@ -190,11 +191,11 @@ class Agent:
         One that comes a second time gets the same answer again, and teaches nothing.
         """
         moment = (perceived.episode, perceived.view.cycle)
-        if moment <= self._moment:
-            return self._answer if moment == self._moment else None
-        if self._in_play and perceived.episode != self._moment[0]:
-            self._end_episode(self._moment[1], Outcome.ABORTED)
-        self._moment, self._in_play = moment, perceived.outcome == Outcome.IN_PLAY
+        if moment <= self.moment:
+            return self._answer if moment == self.moment else None
+        if self._in_play and perceived.episode != self.moment[0]:
+            self._end_episode(self.moment[1], Outcome.ABORTED)
+        self.moment, self._in_play = moment, perceived.outcome == Outcome.IN_PLAY
         self._answer = None
         if not self._in_play:
             self._end_episode(perceived.view.cycle, perceived.outcome)

@@ -5,6 +5,7 @@ from the latched `match` what is played, says on its `status` that it is ready u
 perception comes, and answers perceptions.
 """
 
+import faulthandler
 import signal
 from dataclasses import dataclass, fields
 from importlib.metadata import version
@@ -20,7 +21,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.agent import Agent, AgentConfig, check_config
+from keepaway_agent.agent import Agent, AgentConfig, Perceived, check_config
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.nodes import conversions
 from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
@@ -28,11 +29,14 @@ from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 
 QUEUE = QoSProfile(depth=10)
+ANSWERS = QoSProfile(depth=200)
+"""Deeper than the simulator needs: a recorder may be some cycles behind."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ANNOUNCEMENT_PERIOD = (
     0.5  # [s] a first message may be lost although the nodes have found each other
 )
 PATIENCE = 0.25  # [s] at most, from being told to end to ending
+LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 FIXED = ParameterDescriptor(read_only=True)
 
@@ -74,7 +78,7 @@ class Player(Node):
         self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
         self._start_weights = self._weights_to_start_from(files)
         name = self.get_name()
-        self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", QUEUE)
+        self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", ANSWERS)
         self._status = self.create_publisher(AgentStatus, f"{name}/status", LATCHED)
         self.create_subscription(Match, "match", self._on_match, LATCHED)
         self.create_subscription(
@@ -163,27 +167,34 @@ class Player(Node):
         try:
             perceived = conversions.read_perception(data, agent.facts.num_players, agent.index)
         except AgentError as error:
-            self.get_logger().warning(f"ignored: {error}", throttle_duration_sec=LOG_PERIOD)
+            episode, cycle = agent.moment
+            self.get_logger().warning(
+                f"after episode {episode} cycle {cycle}: ignored: {error}",
+                throttle_duration_sec=LOG_PERIOD,
+            )
             return
         num_ended = agent.episodes + agent.cut_off
         decision = agent.perceive(perceived)
         if decision:
             self._requests.publish(conversions.write_request(agent.index, perceived, decision))
         if agent.episodes + agent.cut_off > num_ended:
-            self._after_episode(agent, perceived.outcome)
+            self._after_episode(agent, perceived)
         if self._is_announcing:
             self._is_announcing = False
             self._announcement.cancel()
 
-    def _after_episode(self, agent: Agent, outcome: int) -> None:
-        if outcome == Outcome.IN_PLAY:
-            self.get_logger().warning("the end of an episode was never perceived")
+    def _after_episode(self, agent: Agent, perceived: Perceived) -> None:
+        if perceived.outcome == Outcome.IN_PLAY:
+            self.get_logger().warning(
+                f"episode {perceived.episode} cycle {perceived.view.cycle}: the end of the episode"
+                " before was never perceived"
+            )
         self._announce()
         if self._save_every > 0 and agent.episodes % self._save_every == 0:
             try:
                 self.save()
             except WeightsError as error:  # the disk may have room again next time
-                self.get_logger().error(f"after {agent.episodes} episodes: {error}")
+                self.get_logger().error(f"after episode {perceived.episode}: {error}")
 
     def _on_save(
         self, request: SaveWeights.Request, response: SaveWeights.Response
@@ -240,4 +251,5 @@ def main(role: Role, args: list[str] | None = None) -> None:
     except (AgentError, InvalidParameterTypeException) as error:
         raise SystemExit(f"{role.name.lower()}: {error}") from error
     finally:
+        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # all is saved
         rclpy.try_shutdown()

@@ -6,6 +6,7 @@ takes a step. Messages are the bytes that `messages` makes, so a recording has j
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import math
 import signal
@@ -50,6 +51,7 @@ MARKER_PERIOD = 0.1  # [s] viewers are not sent more
 HEALTH_PERIOD = 1.0  # [s]
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
+LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 RECORDER_LAG = 50  # [cycles] that a recorder may be behind
 FIXED = ParameterDescriptor(read_only=True)
 ANY_TYPE = ParameterDescriptor(read_only=True, dynamic_typing=True)
@@ -474,4 +476,5 @@ def main(args: list[str] | None = None) -> None:
     except (KeepawayError, InvalidParameterTypeException) as error:
         raise SystemExit(f"simulator: {error}") from error
     finally:
+        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # all is said and saved
         rclpy.try_shutdown()
