@@ -68,7 +68,7 @@ def test_a_run_that_was_interrupted_goes_on_and_repeats_nothing(tmp_path):
         run_all(tmp_path / "cut", Power(2).play)
     before = [trial.key for trial in read_results(tmp_path / "cut").trials]
     after = [trial.key for trial in run_all(tmp_path / "cut", play, resume=True)]
-    assert len(before) == 4  # row 0 in batches of 3 and 1
+    assert len(before) == 6  # a batch of 3 of each of two rows
     assert sorted(before + after) == sorted(KEYS)
     run_all(tmp_path / "whole", play)
     assert set(read_results(tmp_path / "cut").trials) == set(
