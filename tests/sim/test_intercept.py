@@ -95,6 +95,12 @@ def test_a_turn_costs_a_resting_player_one_cycle(to_x, cycles):
     assert intercept.cycles_to_point(C, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, to_x, to_y) == cycles
 
 
+@pytest.mark.parametrize(("to", "cycles"), [((2.93, 0.0), 2), ((0.0, -2.93), 2), ((-2.96, 0.0), 3)])
+def test_a_player_of_unknown_heading_is_believed_to_run_to_the_point(to, cycles):
+    # from 0.3 m a cycle: 0.9 and 0.96 m, so 1.86 m and the reach of 1.085 m in two cycles
+    assert intercept.cycles_to_point(C, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, *to) == cycles
+
+
 @pytest.mark.parametrize(("cycles", "left"), [(0, 10.0), (1, 9.4), (2, 8.56), (3, 7.624)])
 def test_way_left_after_running_straight(cycles, left):
     done = intercept.reach_after(C, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 10.0, 0.0, cycles)

@@ -125,6 +125,24 @@ def test_what_lies_behind_is_felt_within_three_metres():
         assert scene.s.age[0, 0, scene.ball] == age
 
 
+@pytest.mark.parametrize(("age", "felt"), [(12, True), (13, False)])
+def test_who_is_felt_has_no_name_unless_somebody_is_expected_there(age, felt):
+    scene = Scene("a . 1", NARROW)
+    scene.s.age[0, 0, scene.index("a")] = age
+    scene.look("1")
+    assert (scene.s.age[0, 0, scene.index("a")] == 0) == felt
+
+
+@pytest.mark.parametrize(("believed", "known"), [((5.0, 3.4), False), ((5.0, 3.6), True)])
+def test_who_is_not_where_it_must_be_seen_is_not_known_any_more(believed, known):
+    # at 34 and 36 degrees: inside the cone of 45 to each side by more and by less than 10
+    scene = Scene("1", NARROW)
+    scene.s.age[0, 0, scene.index("a")] = 2
+    scene.s.position[0, 0, scene.index("a")] = believed
+    scene.look("1")
+    assert (scene.s.age[0, 0, scene.index("a")] == 2) == known
+
+
 @pytest.mark.parametrize(
     ("distance", "draws", "velocity"),
     [

@@ -11,7 +11,6 @@ import math
 from keepaway_sim.compiled import compiled
 from keepaway_sim.config import NEVER, ROLL_CYCLES
 from keepaway_sim.geometry import clip, length
-from keepaway_sim.physics import limited
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
@@ -19,6 +18,8 @@ SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
 STILL = 0.01  # [m/cycle] a slower ball lies still
 BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
+LATELY = 3  # [cycles] P: motion seen longer ago is unknown
+UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
@@ -73,7 +74,7 @@ def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
 
 @compiled
 def _faces(c, rel_x, rel_y, vx, vy, ux, uy):
-    """Does a point lie so well ahead that `heading_to_go` would not turn? (Cheap; misses some.)"""
+    """Does a point lie so well ahead that `heading_to_go` does not turn? Cheap, and misses some."""
     rel_x, rel_y = rel_x - vx, rel_y - vy
     ahead = ux * rel_x + uy * rel_y
     return ahead > 0.0 and abs(ux * rel_y - uy * rel_x) <= 0.9 * c.kickable_distance
@@ -207,12 +208,18 @@ def run_cycles(c, distance, speed):
 
 @compiled
 def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
-    """Cycles a player needs to bring a point within kicking distance (turns included)."""
+    """Cycles a player needs to bring a point within kicking distance (turns included).
+
+    A player whose heading is unknown (ux = uy = 0) is believed to run there (P).
+    """
     cycles = 0
     for _ in range(5):
         rel_x, rel_y = to_x - x, to_y - y
-        if length(rel_x, rel_y) < c.kickable_distance:
+        distance = length(rel_x, rel_y)
+        if distance < c.kickable_distance:
             return cycles
+        if ux == 0.0 and uy == 0.0:
+            return run_cycles(c, distance, UNKNOWN_SPEED)
         if _faces(c, rel_x, rel_y, vx, vy, ux, uy):
             break
         turns, ux, uy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)

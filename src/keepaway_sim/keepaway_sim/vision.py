@@ -32,6 +32,7 @@ BUMPED_DISTANCE = 0.2  # [m] P: where a ball is believed after a bump
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
 CHANGED_VELOCITY = 0.3  # [m/cycle] or one whose idea of its velocity differs by more
 DEAF_RANGE = 3.0  # [m] P: nearer to the ball than this, a player trusts itself
+GHOST_MARGIN = math.radians(10.0)  # inside the cone's edge: there it must be seen
 SHARED_RANGE = 20.0  # [m] P: a player speaks of a ball it sees nearer than this
 DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is rounded to it
 
@@ -72,6 +73,7 @@ class Memory(NamedTuple):
 
     self_error: np.ndarray  # (F, P, 2) [m] believed minus true own position
     look_phase: np.ndarray  # (F, P) int64
+    motion_cycle: np.ndarray  # (F, P, P) int64 cycle in which another's motion was seen last
     command: np.ndarray  # (F, P, 3) kind, power, angle of the last command
     turned: np.ndarray  # (F, P) [rad] own turn expected of the last command
     kicked: np.ndarray  # (F, P) bool: the last command kicked the ball
@@ -127,6 +129,7 @@ def make_memory(c: Any, num_fields: int) -> Memory:
     return Memory(
         self_error=np.zeros((*shape, 2)),
         look_phase=np.zeros(shape, dtype=np.int64),
+        motion_cycle=np.full((*shape, num_players), -NEVER, dtype=np.int64),
         command=np.zeros((*shape, 3)),
         turned=np.zeros(shape),
         kicked=np.zeros(shape, dtype=np.bool_),
@@ -157,6 +160,7 @@ def forget(c, s, m, f, p, uniforms, cursor):
         s.age[f, p, j] = NEVER
         s.velocity[f, p, j, 0] = 0.0
         s.velocity[f, p, j, 1] = 0.0
+    m.motion_cycle[f, p, :] = -NEVER
     m.turned[f, p] = 0.0
     m.kicked[f, p] = False
     m.pass_cycle[f, p] = -2
@@ -389,28 +393,49 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         dx, dy = dx / distance, dy / distance
         direction = wrap(bearing(dx, dy) - face)
         seen = abs(direction) <= 0.5 * c.visible_angle
-        if not seen and distance > c.feel_distance:
+        if not seen and (distance > c.feel_distance or _is_nameless(c, s, f, p, j)):
+            _forget_ghost(c, s, f, p, j)
             continue
         if c.direction_step == 0.0:
             ux, uy = rotated(dx, dy, *error)
         else:
             step = int(round(direction / c.direction_step)) + len(c.direction_cosine) // 2
             ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
-        _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, uniforms, cursor)
+        moves = seen and _velocity_visible(c, distance, uniforms, cursor, f)
+        _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, moves)
         if seen and j < num:
             s.body[f, p, j] = wrap(yaw[j] + yaw_error)
+            if moves:
+                m.motion_cycle[f, p, j] = s.cycle[f]
     own, ball = s.position[f, p, p], s.position[f, p, num]
     if length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
         _stop_ball_of_opponent(c, s, f, p)
 
 
 @compiled
-def _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, uniforms, cursor):
-    """Object j as seen (with velocity) or only felt by player p.
+def _is_nameless(c, s, f, p, j):
+    """S: who is only felt is no more than a player; P: it is taken for the one expected there."""
+    return j < c.num_keepers + c.num_takers and s.age[f, p, j] > c.player_lost_age
+
+
+@compiled
+def _forget_ghost(c, s, f, p, j):
+    """P removeGhosts: what is not where it must be seen is not known any more."""
+    own = s.position[f, p, p]
+    dx, dy = s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1]
+    direction = wrap(bearing(dx, dy) - s.body[f, p, p] - s.neck[f, p])
+    if abs(direction) < 0.5 * c.visible_angle - GHOST_MARGIN:
+        s.age[f, p, j] = NEVER
+
+
+@compiled
+def _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, moves):
+    """Object j as seen or only felt by player p.
 
     Args:
         dx, dy, distance: unit vector to the object and how far it is [m].
         ux, uy: the unit vector as player p believes it.
+        seen, moves: is it seen, and how it moves?
     """
     reported = _reported_distance(c, distance)
     ball = c.num_keepers + c.num_takers
@@ -424,7 +449,7 @@ def _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, uniforms, curs
             s.velocity[f, p, j, 0] += (s.position[f, p, j, 0] - old_x) * c.ball_decay
             s.velocity[f, p, j, 1] += (s.position[f, p, j, 1] - old_y) * c.ball_decay
         return
-    if not _velocity_visible(c, distance, uniforms, cursor, f):
+    if not moves:
         return
     wx, wy = velocity[j, 0] - velocity[p, 0], velocity[j, 1] - velocity[p, 1]
     radial = reported * quantize((wx * dx + wy * dy) / distance, c.change_step)

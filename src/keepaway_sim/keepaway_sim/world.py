@@ -16,7 +16,7 @@ from keepaway_sim.compiled import compiled, compiled_apart
 from keepaway_sim.config import NEVER, Config, pack
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.geometry import TWO_PI, length
-from keepaway_sim.intercept import cycles_to_ball
+from keepaway_sim.intercept import LATELY, UNKNOWN_SPEED, cycles_to_ball
 from keepaway_sim.streams import RandomStreams, draw
 from keepaway_sim.task import Action, Outcome, Task
 
@@ -385,7 +385,7 @@ def _perceive(c, state, s, m, speech, uniforms, cursor, f):
 def _judge(c, s, m, f, p):
     """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
     num = c.num_keepers + c.num_takers
-    ball, ball_v = s.position[f, p, num], s.velocity[f, p, num]
+    ball = s.position[f, p, num]
     known = s.age[f, p, num] <= c.ball_lost_age
     own = s.position[f, p, p]
     near = length(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
@@ -394,13 +394,13 @@ def _judge(c, s, m, f, p):
     if s.ball_kickable[f, p]:
         s.cycles_to_ball[f, p, p] = 0
     elif known and p < c.num_keepers:
-        _find_fastest_keeper(c, s, f, p)
+        _find_fastest_keeper(c, s, m, f, p)
     passing = m.pass_cycle[f, p] == s.cycle[f] - 1 and s.ball_kickable[f, p]
     s.decision_due[f, p] = s.outcome[f] == _IN_PLAY and not passing
 
 
 @compiled
-def _find_fastest_keeper(c, s, f, p):
+def _find_fastest_keeper(c, s, m, f, p):
     """Which keeper reaches the ball first, as player p believes, and when (equal ones all count).
 
     Begins with the keeper nearest to the ball, so that most others are soon seen to be slower.
@@ -415,6 +415,8 @@ def _find_fastest_keeper(c, s, f, p):
         x, y = s.position[f, p, j]
         vx, vy = s.velocity[f, p, j]
         ux, uy = math.cos(s.body[f, p, j]), math.sin(s.body[f, p, j])
+        if j != p and s.cycle[f] - m.motion_cycle[f, p, j] > LATELY:
+            vx, vy, ux, uy = UNKNOWN_SPEED, 0.0, 0.0, 0.0
         place, motion = s.position[f, p, ball], s.velocity[f, p, ball]
         cycles = cycles_to_ball(c, x, y, vx, vy, ux, uy, place, motion, fastest)
         if cycles < fastest:
