@@ -1,12 +1,14 @@
 """Trainings: the same in any number of processes, and gone on with after any interruption."""
 
 import dataclasses
+import hashlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +165,20 @@ def test_the_script_says_how_it_went(tmp_path):
     assert numbers["sem_duration_s"] == pytest.approx(durations.std(ddof=1) / np.sqrt(10))
     assert numbers["out_of_bounds_share"] == (outcomes == Outcome.OUT_OF_BOUNDS).mean()
     assert numbers["simulated_hours"] == pytest.approx(durations.sum() / 3600)
+
+
+def test_a_seed_gives_one_hash_of_the_weights_in_every_run_on_any_number_of_processes(tmp_path):
+    hashes = set()
+    for processes, fields in ((1, 2), (2, 1)):
+        folder = tmp_path / str(processes)
+        spread = ["--processes", processes, "--fields", fields, "--save-weights", folder]
+        done = train("--episodes", 20, "--trials", 2, "--seed", 7, *spread)
+        assert done.returncode == 0, done.stderr
+        files = sorted(folder.glob("trial_*/keeper_*.npz"))
+        assert len(files) == 6
+        values = b"".join(zipfile.ZipFile(file).read("weights.npy") for file in files)
+        hashes.add(hashlib.sha256(values).hexdigest())
+    assert len(hashes) == 1
 
 
 def test_a_refusal_is_one_line():
