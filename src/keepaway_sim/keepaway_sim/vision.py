@@ -399,7 +399,7 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         if c.direction_step == 0.0:
             ux, uy = rotated(dx, dy, *error)
         else:
-            step = int(round(direction / c.direction_step)) + len(c.direction_cosine) // 2
+            step = round(direction / c.direction_step) + len(c.direction_cosine) // 2
             ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
         moves = seen and _velocity_visible(c, distance, uniforms, cursor, f)
         _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, moves)
