@@ -25,8 +25,11 @@ def check(*arguments: object) -> "subprocess.CompletedProcess[str]":
         (["--one-size", "--", "scripts/keeper.py", "--policy", "learn"], 13),
         (["--name", "taker_2", "--", "scripts/taker.py"], 14),
         (["--name", "keeper_3", "--", EXAMPLES / "smallest_agent.py"], 14),
+        (["--name", "keeper_1", "--", EXAMPLES / "rule_keeper.py"], 14),
+        (["--name", "keeper_2", "--", EXAMPLES / "network_keeper.py"], 14),
+        (["--name", "keeper_3", "--", EXAMPLES / "dds_keeper.py"], 14),
     ],
-    ids=["keeper", "taker", "smallest"],
+    ids=["keeper", "taker", "smallest", "rule", "network", "dds"],
 )
 def test_they_keep_to_the_contract(arguments: list[object], num_sentences: int) -> None:
     checked = check(*arguments)

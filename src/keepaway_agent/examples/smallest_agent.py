@@ -34,25 +34,26 @@ class SmallestAgent(Node):
         """Answer what is due, by its episode and cycle."""
         if not seen.decision_due or len(seen.cycles_to_ball) != len(self.match.player_names):
             return
-        answer = ActionRequest(player_index=self.index, action=self.choose(seen))
+        action, target = self.choose(seen)
+        answer = ActionRequest(player_index=self.index, action=action, target=target)
         answer.episode, answer.cycle = seen.episode, seen.cycle
         self.requests.publish(answer)
 
     def choose(self, seen):
-        """Which of ActionRequest's actions to ask for: this is the part to change."""
+        """One of ActionRequest's actions, and its target: this is the part to change."""
         is_keeper = self.index < self.match.num_keepers
         if is_keeper and seen.ball_kickable:
-            return ActionRequest.HOLD_BALL
+            return ActionRequest.HOLD_BALL, 0
         if is_keeper and seen.cycles_to_ball[self.index] > min(seen.cycles_to_ball):
-            return ActionRequest.GET_OPEN
-        return ActionRequest.GO_TO_BALL
+            return ActionRequest.GET_OPEN, 0
+        return ActionRequest.GO_TO_BALL, 0
 
 
-def main() -> None:
+def main(agent=SmallestAgent):
     """Play until told to end (SIGINT, SIGTERM)."""
     rclpy.init()
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(SmallestAgent())
+        rclpy.spin(agent())
 
 
 if __name__ == "__main__":

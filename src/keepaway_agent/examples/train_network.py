@@ -1,6 +1,6 @@
 """Train a neural network on the Gymnasium environment, and Sarsa with a CMAC beside it.
 
-    .venv/bin/python src/keepaway_agent/examples/train_network.py --hours 20 --trials 8
+    .venv/bin/python src/keepaway_agent/examples/train_network.py --hours 10 --trials 5
 
 One page, after CleanRL's: settings, the loop, a figure. Field k is trial k: it has a network of
 its own, and plays what trial k of `scripts/train.py` plays with the same seed. All keepers of a
@@ -29,8 +29,8 @@ class Args:
     """What is trained; every field is an option."""
 
     task: str = "3v2"  # keepers v takers
-    hours: float = 20.0  # simulated, of every trial
-    trials: int = 8  # side by side
+    hours: float = 10.0  # simulated, of every trial
+    trials: int = 5  # side by side
     seed: int = 0  # of every random number
     gamma: float = 0.99  # discount per cycle
     epsilon_from: float = 0.3  # share of random choices at first

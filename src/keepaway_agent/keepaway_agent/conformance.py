@@ -21,7 +21,9 @@ FIELD_SIZE: Final = 25.0  # [m]
 CYCLE_TIME: Final = 0.1  # [s]
 PAUSE: Final = 3.0  # [s] of wall time
 MOST_ACTION_VALUES: Final = 64
-GOOD_CODES: Final = (0,)
+CDR_HEADER: Final = b"\x00\x01\x00\x00"
+"""Of every message. What begins otherwise an agent's middleware may refuse by itself; it then goes
+on asking for it, and nothing that is said later arrives."""
 
 READY: Final = "is ready"
 ASKED: Final = "speaks when asked"
@@ -225,8 +227,8 @@ class _Scenes:
 
 
 def _garbage(scenes: _Scenes, rng: np.random.Generator) -> Iterator[Step]:
-    for data in (b"\x00\x01\x00\x00", rng.bytes(60), b"\x00\x01\x00\x00" + b"\xff" * 300):
-        yield Garbage(data)
+    for data in (rng.bytes(60), bytes(8), b"\xff" * 300):
+        yield Garbage(CDR_HEADER + data)
     for shown in scenes.episode("garbage", 1):
         bad = replace(shown, is_garbage=True, due=True)
         yield replace(bad, player=shown.player + 1)
@@ -270,7 +272,7 @@ def judge(log: Sequence[Exchange], name: str, exit_code: int | None) -> list[Ver
         *(_judge_chapter(log, chapter) for chapter in CHAPTERS if _due(log, chapter)),
         _judge_requests(log, name),
         _judge_legality(log),
-        Verdict(LEAVES, "ends on SIGTERM with exit code 0", exit_code in GOOD_CODES, left),
+        Verdict(LEAVES, "ends on SIGTERM with exit code 0", exit_code == 0, left),
     ]
 
 
