@@ -39,6 +39,15 @@ def test_they_keep_to_the_contract(arguments: list[object], num_sentences: int) 
     assert checked.returncode == 0
 
 
+@pytest.mark.skipif(
+    not (EXAMPLES / "javascript" / "node_modules" / "rclnodejs" / "build" / "Release").is_dir(),
+    reason="rclnodejs is not built: src/keepaway_agent/examples/javascript/setup does it",
+)
+def test_the_agent_in_javascript_keeps_to_the_contract() -> None:
+    checked = check("--", EXAMPLES / "javascript" / "run")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
 def test_what_an_agent_does_wrong_is_said(tmp_path: Path) -> None:
     text = (EXAMPLES / "smallest_agent.py").read_text()
     agent = tmp_path / "rude.py"
