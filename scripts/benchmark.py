@@ -55,7 +55,7 @@ def parse() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", action="append", choices=PARTS, help="one part (repeatable)")
-    parser.add_argument("--fields", type=int, default=64, help="side by side (default 64)")
+    parser.add_argument("--fields", type=int, default=128, help="side by side (default 128)")
     parser.add_argument("--cycles", type=int, default=2000, help="of a measurement (default 2000)")
     parser.add_argument("--episodes", type=int, default=60, help="of a match (default 60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -161,8 +161,8 @@ def measure_processes(args: argparse.Namespace) -> dict[str, float]:
     """Rate of two processes together over that of one alone, in wall time."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import time, benchmark\n"
-        "benchmark.trainer_time('3v2', 'learn', 64, 100); input()\n"
-        "start = time.time(); benchmark.trainer_time('3v2', 'learn', 64, int(sys.argv[2]))\n"
+        "benchmark.trainer_time('3v2', 'learn', 128, 100); input()\n"
+        "start = time.time(); benchmark.trainer_time('3v2', 'learn', 128, int(sys.argv[2]))\n"
         "print(time.time() - start)"
     )
 

@@ -80,15 +80,14 @@ def describe(work: tuple[Cell, int]) -> dict[str, float]:
 
 
 def train(work: tuple[str, int]) -> np.ndarray:
-    """A learning curve."""
+    """Learning curves of a profile."""
     return fidelity.learn(*work, LEARNING_EPISODES)
 
 
 def learn(profiles: Sequence[str], seeds: int, workers: int) -> dict[str, np.ndarray]:
     """Learning curves of each profile, (num_seeds, num_blocks) [s]."""
-    work = [(profile, number) for profile in profiles for number in range(seeds)]
-    curves = np.stack(list(in_processes(train, work, workers)))
-    return dict(zip(profiles, curves.reshape(len(profiles), seeds, -1), strict=True))
+    curves = in_processes(train, [(profile, seeds) for profile in profiles], workers)
+    return dict(zip(profiles, curves, strict=True))
 
 
 def spread(play: Callable[[Any], Any], cells: list[Cell], episodes: int, workers: int) -> list[Any]:

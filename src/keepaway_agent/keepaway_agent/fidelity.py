@@ -198,18 +198,20 @@ def record(cell: Cell, episodes: int, num_fields: int = 64) -> Trajectories:
     return recorder.trajectories()
 
 
-def learn(profile: str, number: int, episodes: int) -> np.ndarray:
-    """A learning curve of 3v2 from scratch: means of successive blocks of BLOCK episodes [s].
+def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
+    """Learning curves of 3v2 from scratch, (num_trials, num_blocks).
 
-    The learner is the reference framework's: its order of players and its tile widths.
+    Means of successive blocks of BLOCK episodes [s]. All trials are played side by side. The
+    learner is the reference framework's: its order of players and its tile widths.
     """
     trials = Training(
         task="3v2", profile=profile, ordering="k1", tile_widths="framework",
         episodes=episodes, seed=SEED,
     )  # fmt: skip
-    (result,) = play(trials, [number])
-    blocks = result.durations[: episodes // BLOCK * BLOCK].reshape(-1, BLOCK)
-    return np.asarray(blocks.mean(axis=1) * CYCLE_TIME)
+    durations = {r.trial.label: r.durations for r in play(trials, range(num_trials))}
+    played = np.stack([durations[number] for number in range(num_trials)])
+    blocks = played[:, : episodes // BLOCK * BLOCK].reshape(num_trials, -1, BLOCK)
+    return np.asarray(blocks.mean(axis=2) * CYCLE_TIME)
 
 
 class Recorder:

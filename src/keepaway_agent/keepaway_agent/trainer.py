@@ -166,7 +166,7 @@ class Trainer:
         progress: of the run that goes on, or of the last.
     """
 
-    def __init__(self, config: TrainerConfig, num_fields: int = 64) -> None:
+    def __init__(self, config: TrainerConfig, num_fields: int = 128) -> None:
         """Lay out the fields and make room for the learners.
 
         Raises:

@@ -53,7 +53,7 @@ from keepaway_sim import config as world_config
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 
-NUM_FIELDS: Final = 64
+NUM_FIELDS: Final = 128
 """Fields played in lock-step by one process."""
 RECORDED_TRIAL: Final = 0
 """The trial that can be recorded: it is the same as a match of ROS nodes with the seed."""
