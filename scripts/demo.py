@@ -50,8 +50,8 @@ class Args:
     out: Path = Path("out/demo")  # folder of all files; an earlier demo there is replaced
     seed: int = 0  # every random number follows from it
     episodes: int = 60  # of the recorded 3v2 match
-    source_hours: float = 4.0  # simulated, of 3v2 training of every trial
-    target_hours: float = 2.0  # simulated, of 4v3 training of every trial
+    source_hours: float = 6.0  # simulated, of 3v2 training of every trial
+    target_hours: float = 6.0  # simulated, of 4v3 training of every trial
     trials: int = 8  # of the small study
 
 

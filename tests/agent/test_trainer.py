@@ -259,7 +259,7 @@ def test_takers_that_learn_end_episodes_of_fixed_keepers_sooner_than_hand_coded_
 
 
 def test_keepers_that_learn_hold_the_ball_longer():
-    results = play([make_trial(k, 800) for k in range(8)], 8, TrainerConfig())
+    results = play([make_trial(k, 1200) for k in range(8)], 8, TrainerConfig())
     early = np.mean([result.durations[:100].mean() for result in results])
     late = np.mean([result.durations[-100:].mean() for result in results])
     assert late > 1.15 * early

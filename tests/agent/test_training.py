@@ -12,6 +12,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import psutil  # type: ignore[import-untyped]
 import pytest
 
 from keepaway_agent.actions import Outcome, Role
@@ -188,9 +189,22 @@ def test_a_refusal_is_one_line():
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_a_training_that_was_killed_leaves_no_process_behind(tmp_path):
+    options = ["--episodes", "100000", "--trials", "2", "--processes", "2"]
+    with subprocess.Popen([sys.executable, str(SCRIPT), *options]) as killed:
+        workers: list[psutil.Process] = []
+        while len(workers) < 2:
+            time.sleep(0.1)
+            workers = [
+                w for w in psutil.Process(killed.pid).children() if "spawn_main" in str(w.cmdline())
+            ]
+        killed.kill()
+    assert psutil.wait_procs(workers, timeout=60)[1] == []
+
+
 def test_a_training_stopped_by_ctrl_c_goes_on_where_it_was(tmp_path):
     out = tmp_path / "out"
-    options = ["--episodes", "60", "--trials", "6", "--fields", "1", "--processes", "2"]
+    options = ["--episodes", "300", "--trials", "6", "--fields", "1", "--processes", "2"]
     command = [
         sys.executable,
         str(SCRIPT),
@@ -215,7 +229,7 @@ def test_a_training_stopped_by_ctrl_c_goes_on_where_it_was(tmp_path):
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     assert json.loads(again.stdout)["trials"] == 6
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
-    whole = by_number(play(Training(episodes=60), range(6)))
-    folder = TrainingFolder(out, Training(episodes=60), any_code=True)
+    whole = by_number(play(Training(episodes=300), range(6)))
+    folder = TrainingFolder(out, Training(episodes=300), any_code=True)
     for number in range(6):
         np.testing.assert_array_equal(folder.episodes(number)[0], whole[number].durations)

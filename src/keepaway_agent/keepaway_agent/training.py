@@ -19,6 +19,7 @@ import os
 import queue
 import shutil
 import signal
+import threading
 from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -254,7 +255,7 @@ def _work(
     recorder: TrialRecorder | None,
 ) -> None:
     """A process: play one trial after the other of those that nobody has taken yet."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+    end_with_parent()
 
     def next_numbers() -> Iterator[int]:
         while True:
@@ -272,6 +273,22 @@ def _work(
             tell(result)
     except ValueError as error:
         said.put((place, error))
+
+
+def end_with_parent() -> None:
+    """Let a worker process end when the process that started it does, however that ended.
+
+    For worker processes, which would otherwise wait for ever when a run was killed.
+    Ctrl-C in a terminal reaches workers too; it is left to the process that started them.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _gather(

@@ -5,10 +5,6 @@ processes on this machine, or a cluster's through its own executor (Dask's `Clie
 A trial gives the same whatever batch it is in, so a run can be stopped and gone on with anywhere.
 """
 
-import multiprocessing
-import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
@@ -106,22 +102,6 @@ class Progress:
         minutes = self.seconds_left / 60
         left = "unknown" if minutes == float("inf") else f"{minutes:.0f} min"
         return f"{self.done}/{self.trials} trials, time left {left}"
-
-
-def end_with_parent() -> None:
-    """Let a worker process end when the process that started it does, however that ended.
-
-    The initializer of a process pool's workers: else those of a killed run would wait for ever.
-    Ctrl-C in a terminal reaches workers too; it is left to the process that started them.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_wait_for_parent, daemon=True).start()
-
-
-def _wait_for_parent() -> None:
-    if (parent := multiprocessing.parent_process()) is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _chunks(numbers: range, size: int) -> list[range]:

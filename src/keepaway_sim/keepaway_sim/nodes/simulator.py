@@ -164,6 +164,7 @@ class Simulator(Node):
         Raises:
             KeepawayError: it is not whole.
         """
+        self._voice.write_down()
         if self._bag is not None:
             self._bag.close()
         if self._voice.trouble:
@@ -327,6 +328,7 @@ class Simulator(Node):
     def _collect(self) -> None:
         """Wait for the answers; unless in lock-step, until the cycle's time is over."""
         until = self._end_of_cycle()
+        self._voice.write_down()
         while self._is_collecting(until):
             self._spin(min(RESEND_PERIOD, max(0.0, until - time.monotonic())))
             now = time.monotonic()

@@ -42,6 +42,7 @@ class Voice:
         perceptions = {f"{name}/perception": _PERCEPTION for name in player_names}
         self._bag, self._logger = bag, node.get_logger()
         self.trouble = ""
+        self._notes: list[tuple[str, str, bytes, int]] = []
         self._publishers: dict[str, Publisher] = {}
         self._types: dict[str, str] = {}
         for topic, (message_class, message_type, qos) in (TOPICS | perceptions).items():
@@ -60,9 +61,11 @@ class Voice:
         self._publishers[topic].publish(data)
 
     def say_if_heard(self, topic: str, make: Callable[[], bytes], time: int) -> None:
-        """Make the message and say it, if somebody listens or a bag is written."""
-        if self._bag is not None or self._publishers[topic].get_subscription_count():
+        """Make the message if somebody listens or a bag is written, and publish or record it."""
+        if self.has_listeners(topic):
             self.say(topic, make(), time)
+        elif self._bag is not None:
+            self.note(self._publishers[topic].topic_name, self._types[topic], make(), time)
 
     def has_listeners(self, topic: str) -> bool:
         """Does anybody listen?"""
@@ -73,14 +76,22 @@ class Voice:
         self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
 
     def note(self, topic: str, message_type: str, data: bytes, time: int) -> None:
-        """Record what somebody else said, if a bag is written; `topic` is its name in full.
+        """Record what somebody else said, if a bag is written; `topic` is its name in full."""
+        if self._bag is not None:
+            self._notes.append((topic, message_type, data, time))
 
-        A bag that cannot be written (the disk is full) ends there; the match does not.
+    def write_down(self) -> None:
+        """Write into the bag what was said and noted since the last time.
+
+        Done while the players think, so that a recorded match is hardly slower. A bag that cannot
+        be written (the disk is full) ends there; the match does not.
         """
+        notes, self._notes = self._notes, []
         if self._bag is None:
             return
         try:
-            self._bag.write(topic, message_type, data, time)
+            for note in notes:
+                self._bag.write(*note)
         except KeepawayError as error:
             self._bag, self.trouble = None, str(error)
             self._logger.error(f"the match goes on unrecorded: {error}")
