@@ -64,6 +64,7 @@ def test_a_full_disk_ends_the_recording_but_not_the_match(
     simulator = graph.start_simulator(episodes=3, record=str(bag), **PATIENT)
     graph.start_players(policy="random")
     graph.play(until=lambda: simulator.num_finished >= 1)
+    simulator._voice.write_down()
     simulator._bag.flush()  # type: ignore[union-attr]
     full_disk(bag.joinpath("bag_0.mcap").stat().st_size + 100)
     assert graph.play() == played(expected)

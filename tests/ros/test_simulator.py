@@ -141,7 +141,7 @@ def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
 
 
 def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain: int) -> None:
-    simulator = graph.start_simulator(episodes=2, answer_timeout=SLOW_ENOUGH)
+    simulator = graph.start_simulator(episodes=6, answer_timeout=SLOW_ENOUGH)
     graph.start_players(policy="random")
     context = Context()
     rclpy.init(context=context, domain_id=ros_domain)
@@ -163,8 +163,9 @@ def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain:
             status.publish(AgentStatus(name="keeper_1", ready=True, episodes=1000))
 
     graph.play(until=lambda: simulator.num_cycles >= 1)
+    graph.spin_until(lambda: requests.get_subscription_count() > 0)
     graph.hook = meddle
-    assert graph.play() == played(trained(2, policy="random"))
+    assert graph.play() == played(trained(6, policy="random"))
     assert simulator.roster.seats[0].rejected > 10
     stranger.destroy_node()
     context.shutdown()
