@@ -105,6 +105,7 @@ class FieldMessages:
             num, {**places, "ages": objects, "cycles_to_ball": num}
         )
         self._perceptions["player_index"] = np.arange(num)
+        self._clock = codec(CLOCK).empty(1, {})
         self._state = codec(FIELD_STATE).empty(
             1, {**places, "yaws": num, "neck_yaws": num, "actions": num, "targets": num}
         )
@@ -115,7 +116,9 @@ class FieldMessages:
 
     def clock(self) -> bytes:
         """A Clock message."""
-        return codec(CLOCK).encode({"clock": stamp(self.stamp_ns())})
+        now = stamp(self.stamp_ns())
+        self._clock["clock.sec"], self._clock["clock.nanosec"] = now["sec"], now["nanosec"]
+        return self._clock.tobytes()
 
     def perceptions(self) -> list[bytes]:
         """A Perception message of every player, in match order."""

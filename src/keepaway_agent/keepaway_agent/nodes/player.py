@@ -6,6 +6,7 @@ perception comes, and answers perceptions.
 """
 
 import faulthandler
+import gc
 import signal
 from dataclasses import dataclass, fields
 from importlib.metadata import version
@@ -245,6 +246,7 @@ def main(role: Role, args: list[str] | None = None) -> None:
         player = Player(role)
         executor = EventsExecutor()  # the quick one
         executor.add_node(player)
+        gc.freeze()  # what has been imported and compiled stays: no collection looks at it again
         while not told:
             executor.spin_once(timeout_sec=PATIENCE)
         player.save()

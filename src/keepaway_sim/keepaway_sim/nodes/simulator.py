@@ -7,6 +7,7 @@ takes a step. Messages are the bytes that `messages` makes, so a recording has j
 from __future__ import annotations
 
 import faulthandler
+import gc
 import json
 import math
 import signal
@@ -312,9 +313,8 @@ class Simulator(Node):
         return (self._messages.stamp_ns() - self._recorded) // messages.CYCLE_NS
 
     def _send(self) -> None:
-        """Tell everybody about this moment."""
+        """Tell everybody about this moment: first the players, who then think meanwhile."""
         now, stamp = time.monotonic(), self._messages.stamp_ns()
-        self._say_to_spectators(now, stamp)
         for name in self.roster.begin(self.world, now):
             self.get_logger().info(f"{name} is back")
         self._perceptions = self._messages.perceptions()
@@ -324,6 +324,7 @@ class Simulator(Node):
         if seen.outcome[0] != Outcome.IN_PLAY and seen.episode[0] == self.num_finished:
             self._voice.say("episode", self._messages.episode(self.settings.seed), stamp)
             self.num_finished += 1
+        self._say_to_spectators(now, stamp)
 
     def _collect(self) -> None:
         """Wait for the answers; unless in lock-step, until the cycle's time is over."""
@@ -471,6 +472,7 @@ def main(args: list[str] | None = None) -> None:
         simulator = Simulator()
         executor = EventsExecutor()  # the quick one
         executor.add_node(simulator)
+        gc.freeze()  # what has been imported and compiled stays: no collection looks at it again
         try:
             simulator.play(lambda timeout: executor.spin_once(timeout), lambda: bool(told))
         finally:
