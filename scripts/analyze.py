@@ -10,6 +10,7 @@ bag it has a line for every episode (CSV and Parquet), hold times, passes, losse
 """
 
 import argparse
+import signal
 import sys
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from keepaway_transfer.results import read_results
 def main() -> int:
     """Print the table and say where the files are."""
     arguments = _parse()
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `analyze.py BAG | head` ends quietly
     try:
         if arguments.results.suffix == ".kwy":
             print(_log_line(arguments.results, arguments.threshold or 9.0, arguments.window))

@@ -93,10 +93,9 @@ class Scoreboard(Node):
         mean = recent["mean_duration_s"]
         of = f"/{self._num_wanted}" if self._num_wanted else ""
         held = f", last {recent['episodes']} held {mean:.2f} s" if mean is not None else ""
-        return (
-            f"{len(self.episodes)}{of} episodes{held},"
-            f" {self.figures.get('cycles_per_second', '?')} cycles/s, {self.state}"
-        )
+        rate = self.figures.get("cycles_per_second", "0")
+        pace = f", {rate} cycles/s" if rate != "0" else ""  # at first it is not known yet
+        return f"{len(self.episodes)}{of} episodes{held}{pace}, {self.state}"
 
     def _on_episode(self, message: Episode) -> None:
         self.episodes[message.number] = message

@@ -288,6 +288,7 @@ class Simulator(Node):
         elif not self._first_counts:
             self._first_counts = {p: s["episodes"] for p, s in self._statuses.items()}
             self._note_statuses()
+            self._say_health()
         return not missing
 
     def _missing(self) -> str:
