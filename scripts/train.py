@@ -65,7 +65,7 @@ def main() -> int:
         print(f"train: {error}", file=sys.stderr)
         return 1
     asked = {k: episodes[k] for k in range(arguments.trials) if k in episodes}
-    report(training, asked, rate, arguments)
+    report(training, asked, rate, folder, arguments)
     if len(asked) < arguments.trials:
         print("train: stopped; the same command goes on from here", file=sys.stderr)
         return 130
@@ -158,7 +158,11 @@ class Meter:
 
 
 def report(
-    training: Training, episodes: Episodes, rate: float | None, arguments: argparse.Namespace
+    training: Training,
+    episodes: Episodes,
+    rate: float | None,
+    folder: TrainingFolder | None,
+    arguments: argparse.Namespace,
 ) -> None:
     """Print how the episodes went."""
     scores = [
@@ -177,6 +181,7 @@ def report(
         "seed": training.seed,
         "policy": training.policy,
         "taker_policy": training.taker_policy,
+        "weights_sha256": folder.weights_hash(episodes) if folder else None,
     }
     if arguments.json:
         print(json.dumps(numbers))
@@ -190,6 +195,7 @@ def report(
             f" last {LAST} episodes of a trial {numbers['last_mean_duration_s']:.2f} s,"
             f" out of bounds {numbers['out_of_bounds_share']:.0%}"
             + (f"\n{rate:,.0f} cycles a second" if rate else "")
+            + (f"\nweights' SHA-256 {numbers['weights_sha256']}" if folder else "")
         )
 
 

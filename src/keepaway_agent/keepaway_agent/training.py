@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import io
 import json
 import math
@@ -20,7 +21,7 @@ import queue
 import shutil
 import signal
 import threading
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -391,6 +392,18 @@ class TrainingFolder:
         durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
         outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
         return durations, outcomes
+
+    def weights_hash(self, numbers: Iterable[int]) -> str:
+        """SHA-256 of every weight that the players of these trials have learned, in order.
+
+        It depends on the settings, the seed and the code alone: not on the run, on how many
+        processes played, nor on the version of Python.
+        """
+        digest = hashlib.sha256()
+        for number in numbers:
+            for path in sorted(self._folder(number).glob("*.npz")):
+                digest.update(load_weights(path).values.tobytes())
+        return digest.hexdigest()
 
     def _folder(self, number: int) -> Path:
         return self.path / f"trial_{number:04}"
