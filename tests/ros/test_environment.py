@@ -38,9 +38,10 @@ def test_the_index_knows_the_messages() -> None:
 
 
 def test_python_alone_is_enough_to_find_ros(tmp_path: Path) -> None:
-    program = "import os, rclpy; print(os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'])"
+    names = ["ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTDDS_BUILTIN_TRANSPORTS"]
+    program = f"import os, rclpy; print(*map(os.environ.get, {names}))"
     bare = {"HOME": str(tmp_path), "PATH": os.defpath}
     said = subprocess.run(
         [sys.executable, "-c", program], env=bare, capture_output=True, text=True, check=True
     )
-    assert said.stdout == "LOCALHOST\n"
+    assert said.stdout == "LOCALHOST UDPv4\n"

@@ -50,7 +50,7 @@ class Scoreboard(Node):
     @property
     def has_begun(self) -> bool:
         """Has there been a kick-off?"""
-        return bool(self.episodes) or self.state == "plays"
+        return bool(self.episodes) or self.state.startswith("plays")
 
     @property
     def next_episode(self) -> int:

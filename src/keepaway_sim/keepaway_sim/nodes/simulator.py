@@ -420,12 +420,20 @@ class Simulator(Node):
             if seat.present
         )
 
+    def _state(self) -> str:
+        """What the match does now, in words."""
+        if not self._is_running:
+            return "pauses"
+        missing, absent = self._missing(), ", ".join(self.roster.absent)
+        if missing:
+            return f"waits for {missing}"
+        return f"plays without {absent}" if absent else "plays"
+
     def _say_health(self) -> None:
         now, seen = time.monotonic(), self.world.perceptions
         recent = (self.num_cycles - self._health_cycles) / (now - self._health_at)
         self._health_at, self._health_cycles = now, self.num_cycles
-        missing = self._missing() if self._is_running else ""
-        state = f"waits for {missing}" if missing else "plays" if self._is_running else "pauses"
+        state = self._state()
         figures = {
             "episode": str(seen.episode[0]),
             "cycle": str(seen.cycle[0]),
