@@ -108,7 +108,7 @@ def main() -> int:
         print(f"{'what is read':24} {'cases':>8} {'accepted':>8} {'refused':>8} {'longest':>9}")
         total = 0
         for name, target in chosen.items():
-            result = fuzz(target, max(1, args.cases // len(chosen)), args.seed)
+            result = fuzz(target, math.ceil(args.cases / len(chosen)), args.seed)
             cases = result.accepted + result.refused
             total += cases
             print(
