@@ -7,7 +7,8 @@ while. `match.py --restart` starts again what was killed. What must hold all the
 
 - episodes are counted without a gap, and none twice;
 - every weights file can be read, and never knows fewer episodes than before;
-- every bag can be read, and holds only episodes that were played.
+- every bag can be read, and holds only episodes that were played;
+- whoever lives plays again within a minute.
 
 Ends with code 1 and the reason where one of these does not hold.
 """
@@ -38,8 +39,10 @@ from keepaway_sim.recording import BagReader, repair
 
 SCRIPTS = Path(__file__).resolve().parent
 PATIENCE = 300.0  # [s] for the match to begin, to go on after a fault, and to end
-LONGEST_FREEZE = 1.5  # [s]
+RETURN = 60.0  # [s] in which a player that lives is heard again, or started again
+LONGEST_FREEZE = 3.0  # [s]
 FAULTS_AN_EPISODE = 5  # at most: where nobody ever gets to play, nothing is tried
+FAULTS_A_PAUSE = 25  # after so many, everybody must come back
 
 
 class LossError(RuntimeError):
@@ -52,13 +55,14 @@ class Witness(Node):
     Attributes:
         numbers: of the episodes that ended, as they were heard.
         missing: how often each player was newly declared missing.
+        absent: who is missing, as last heard; None if nothing was heard yet.
     """
 
     def __init__(self) -> None:
         super().__init__("witness")
         self.numbers: list[int] = []
         self.missing: Counter[str] = Counter()
-        self._absent: set[str] = set()
+        self.absent: set[str] | None = None
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_health, QUEUE)
 
@@ -67,8 +71,8 @@ class Witness(Node):
 
     def _on_health(self, message: DiagnosticArray) -> None:
         absent = {s.name for s in message.status if s.level == DiagnosticStatus.ERROR}
-        self.missing.update(absent - self._absent)
-        self._absent = absent
+        self.missing.update(absent - (self.absent or set()))
+        self.absent = absent
 
 
 class Match:
@@ -192,8 +196,11 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
         faults[fault] += 1
         if fault == "simulator killed" or number % FAULTS_AN_EPISODE == 0:
             wait_for_episodes(executor, witness, 1)
+        if number % FAULTS_A_PAUSE == FAULTS_A_PAUSE - 1:
+            wait_for_everybody(executor, witness)
         match.check_weights()
         check_numbers(witness.numbers)
+    wait_for_everybody(executor, witness)
     wait_for_episodes(executor, witness, 3)
     summary = match.end()
     listen(executor, 0.5)
@@ -243,6 +250,19 @@ def wait_for_episodes(executor: Executor, witness: Witness, more: int) -> None:
         executor.spin_once(0.1)
         if time.monotonic() > until:
             raise LossError(f"no episode ended within {PATIENCE:.0f} s")
+
+
+def wait_for_everybody(executor: Executor, witness: Witness) -> None:
+    """Wait until nobody is missing.
+
+    Raises:
+        LossError: somebody does not come back.
+    """
+    witness.absent, until = None, time.monotonic() + RETURN
+    while witness.absent is None or witness.absent:
+        executor.spin_once(0.1)
+        if time.monotonic() > until:
+            raise LossError(f"not back within {RETURN:.0f} s: {witness.absent or 'all'}")
 
 
 def listen(executor: Executor, seconds: float) -> None:
