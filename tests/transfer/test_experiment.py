@@ -87,7 +87,7 @@ def test_progress_knows_the_time_left_by_the_work_that_was_done():
     now = 100.0
     progress = Progress(TINY, done=KEYS[:4], clock=lambda: now)
     assert str(progress) == "4/12 trials, time left unknown"
-    for trial in play(TINY, KEYS[4:8]):  # half of what is left, bar four episodes of 4,000
+    for trial in play(TINY, KEYS[4:8]):  # half of what is left, bar four episodes of 12,000
         progress.add(trial)
     now = 160.0
     assert progress.seconds_left == pytest.approx(60, rel=0.01)
