@@ -1,6 +1,7 @@
 """Fixtures that every test may use."""
 
 import resource
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -8,6 +9,9 @@ import domain_coordinator
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# A shell lets its background jobs ignore Ctrl-C, and whatever they start: not what tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
