@@ -5,6 +5,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,68 @@ def test_a_bag_says_what_made_it_and_what_is_in_it(tmp_path: Path) -> None:
     assert reader.counts == {"/x": 1, "/y": 1}
     assert (reader.start_time, reader.end_time) == (7, 9)
     assert list(reader.attachments()) == [("keeper_1.weights", b"\x00\x01")]
+
+
+@pytest.fixture
+def long_bag(tmp_path: Path) -> tuple[Path, list[Recorded]]:
+    """A bag in several files, and what was written to it."""
+    written = [Recorded("/a", ACTION_REQUEST, 10 * n, request_at(n)) for n in range(1000)]
+    written[500:500] = [Recorded("/b", EPISODE, 7, codec(EPISODE).encode({}))]
+    with BagWriter(tmp_path / "long", chunk_size=4096, file_chunks=3) as bag:
+        for message in written:
+            bag.write(*message[:2], message.data, message.log_time)
+        bag.add_info(gaps="none")
+    return tmp_path / "long", written
+
+
+def test_a_long_bag_goes_on_in_further_files(long_bag: tuple[Path, list[Recorded]]) -> None:
+    path, written = long_bag
+    files = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    names = [f"long_{number}.mcap" for number in range(len(files["files"]))]
+    assert len(names) > 4
+    assert files["relative_file_paths"] == names == [part["path"] for part in files["files"]]
+    assert sum(part["message_count"] for part in files["files"]) == len(written)
+    assert files["starting_time"] == {"nanoseconds_since_epoch": 0}
+    assert files["duration"] == {"nanoseconds": 9990}
+    for part in files["files"]:
+        with (path / part["path"]).open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert 1 <= len(summary.chunk_indexes) <= 4
+        assert summary.statistics.message_count == part["message_count"]
+
+
+def test_a_long_bag_is_read_as_one(long_bag: tuple[Path, list[Recorded]]) -> None:
+    path, written = long_bag
+    reader = BagReader(path)
+    assert list(reader.messages()) == written
+    assert reader.complete
+    assert reader.info == {"gaps": "none"}
+    assert reader.counts == {"/a": 1000, "/b": 1}
+    with AnyReader([path]) as theirs:
+        messages = [(c.topic, time, bytes(data)) for c, time, data in theirs.messages()]
+    assert sorted(messages) == sorted((m.topic, m.log_time, m.data) for m in written)
+
+
+def test_memory_does_not_grow_with_a_long_bag(tmp_path: Path) -> None:
+    used = []
+    tracemalloc.start()
+    with BagWriter(tmp_path / "bag", file_chunks=100) as bag:
+        for number in range(1000):
+            bag.write(f"/{number % 10}", ACTION_REQUEST, REQUEST, number)
+            bag.flush()
+            if number % 100 == 99:
+                used.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert used[-1] < used[0] + 20_000  # [bytes] 420,000 in one file
+
+
+def test_a_file_that_was_only_just_begun_is_no_harm(long_bag: tuple[Path, list[Recorded]]) -> None:
+    path, written = long_bag
+    for begun in (b"", b"\x89MCAP"):
+        (path / "long_99.mcap").write_bytes(begun)
+        assert list(BagReader(path).messages()) == written
 
 
 def test_a_bag_is_whole_after_an_error(tmp_path: Path) -> None:

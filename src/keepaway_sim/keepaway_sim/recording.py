@@ -1,9 +1,10 @@
 """Bags: what was said in a match, as MCAP files that any ROS 2 tool opens. Needs no ROS.
 
-A bag is a folder like rosbag2's: `NAME/NAME_0.mcap` (profile `ros2`, CDR messages, full `ros2msg`
-definitions, chunked and compressed) and `NAME/metadata.yaml` (version 9). Times are simulated
-time [ns]. What made the bag (task, seed, configuration, code version, policies) is in it too, as
-MCAP metadata "keepaway" and as rosbag2's `custom_data`; weights may be attached.
+A bag is a folder like rosbag2's: `NAME/NAME_0.mcap`, in long recordings `NAME/NAME_1.mcap` and so
+on (profile `ros2`, CDR messages, full `ros2msg` definitions, chunked and compressed), and
+`NAME/metadata.yaml` (version 9). Times are simulated time [ns]. What made the bag (task, seed,
+configuration, code version, policies) is in it too, as MCAP metadata "keepaway" and as rosbag2's
+`custom_data`; weights may be attached.
 
 Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry, rosbag2's `metadata_io.cpp` and
 `rosbag2_storage_mcap`.
@@ -40,6 +41,8 @@ from keepaway_sim.version import __version__
 INFO = "keepaway"
 """Name of the MCAP metadata records that say what made a bag."""
 CHUNK_SIZE = 768 * 1024  # [bytes] as rosbag2's
+FILE_CHUNKS = 1024  # of which a file's index takes some 4 MB of memory
+MESSAGE_OVERHEAD = 31  # [bytes] of a message's record in a chunk, besides its data
 MAX_CHUNK_SIZE = 2**28  # [bytes] unpacked; no writer makes larger ones by default
 COMPRESSIONS = {
     "zstd": CompressionType.ZSTD,
@@ -108,6 +111,10 @@ class Batch(NamedTuple):
 class BagWriter:
     """Writes one bag. Use it in a `with`: the bag is whole when it is left, however that happens.
 
+    A file keeps an index of its chunks in memory until it is finished, so after `file_chunks` of
+    them the bag goes on in a next file, as rosbag2's do: memory does not grow with the bag, and
+    files that are finished stay whole whatever happens later.
+
     Attributes:
         path: the bag's folder.
         topics: by name, those registered so far.
@@ -121,8 +128,9 @@ class BagWriter:
         compression: str = "zstd",
         chunk_size: int = CHUNK_SIZE,
         flush_interval: float = 1.0,
+        file_chunks: int = FILE_CHUNKS,
     ) -> None:
-        """Make the bag's folder and begin its file.
+        """Make the bag's folder and begin its first file.
 
         Args:
             path: a folder that does not exist yet.
@@ -131,6 +139,7 @@ class BagWriter:
             chunk_size: a chunk ends when it has so many bytes,
             flush_interval: or after so long [s, wall time]: what is lost if the writer is killed.
                 With `math.inf` equal messages make equal files.
+            file_chunks: a file ends after about so many chunks.
 
         Raises:
             KeepawayError: the folder exists, or there is no such compression.
@@ -152,15 +161,12 @@ class BagWriter:
         self._info: dict[str, str] = {}
         self.topics: dict[str, Topic] = {}
         self._counts: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
-        self._start, self._end = 2**63 - 1, 0
-        self._file: IO[bytes] | None = self._mcap_path.open("xb")
-        self._writer = Writer(
-            self._file, chunk_size=chunk_size, compression=COMPRESSIONS[compression]
-        )
-        self._writer.start(profile="ros2", library=f"keepaway {__version__}")
+        self._packing = chunk_size, COMPRESSIONS[compression]
+        self._file_chunks = file_chunks
+        self._finished: list[_Part] = []
+        self._is_open = True
         self._flush_interval, self._flushed = flush_interval, time.monotonic()
+        self._file = self._next_file()
         self.add_info(**(info or {}))
         self.flush()
 
@@ -172,7 +178,7 @@ class BagWriter:
         if entries:
             self._info.update(entries)
             with self._giving_up():
-                self._writer.add_metadata(INFO, entries)
+                self._file.add_metadata(INFO, entries)
 
     def add_topic(
         self,
@@ -203,20 +209,8 @@ class BagWriter:
         if definition is None:
             definition, type_hash = cdr.definition(message_type), cdr.type_hash(message_type)
         topic = Topic(name, message_type, definition, type_hash or "", qos)
-        if message_type not in self._schemas:
-            self._schemas[message_type] = self._writer.register_schema(
-                message_type, "ros2msg", definition.encode()
-            )
-        self._channels[name] = self._writer.register_channel(
-            name,
-            "cdr",
-            self._schemas[message_type],
-            {
-                "offered_qos_profiles": _to_yaml([qos.to_dict()]),
-                "topic_type_hash": topic.type_hash,
-            },
-        )
         self.topics[name], self._counts[name] = topic, 0
+        self._file.add_topic(topic)
 
     def write(self, topic: str, message_type: str, data: bytes, log_time: int) -> None:
         """Write one message.
@@ -231,17 +225,17 @@ class BagWriter:
             KeepawayError: the disk is full, or the like; this writer then writes no more, what it
                 has written can be read, and `repair` makes a whole bag of it.
         """
-        channel = self._channels.get(topic)
-        if channel is None:
+        if topic not in self._counts:
             self.add_topic(topic, message_type)
-            channel = self._channels[topic]
         try:
-            self._writer.add_message(channel, log_time, data, log_time, self._counts[topic])
+            if self._file.num_chunks >= self._file_chunks:
+                self._finish_file()
+                self._file = self._next_file()
+            self._file.write(topic, log_time, data, self._counts[topic])
         except OSError as error:
             raise self._given_up(error) from error
         self._counts[topic] += 1
         self.message_count += 1
-        self._start, self._end = min(self._start, log_time), max(self._end, log_time)
         if time.monotonic() - self._flushed > self._flush_interval:
             self.flush()
 
@@ -251,12 +245,12 @@ class BagWriter:
         Errors as in `write`.
         """
         with self._giving_up():
-            self._writer.add_attachment(0, 0, name, media_type, data)
+            self._file.attach(name, data, media_type)
 
     def flush(self) -> None:
         """End the chunk and give everything to the operating system; errors as in `write`."""
         with self._giving_up():
-            self._writer.flush()
+            self._file.flush()
         self._flushed = time.monotonic()
 
     def close(self) -> None:
@@ -264,16 +258,13 @@ class BagWriter:
 
         Nothing happens the second time, or after an error.
         """
-        if self._file is None:
+        if not self._is_open:
             return
-        metadata = self._metadata()
-        text = _to_yaml({"rosbag2_bagfile_information": metadata})
+        text = _to_yaml({"rosbag2_bagfile_information": self._metadata()})
         with self._giving_up():
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": _to_yaml(metadata)})
-            self._writer.finish()
-            self._file.close()
+            self._finish_file()
             (self.path / "metadata.yaml").write_text(text)
-        self._file = None
+        self._is_open = False
 
     def __enter__(self) -> Self:
         return self
@@ -286,6 +277,15 @@ class BagWriter:
     ) -> None:
         self.close()
 
+    def _next_file(self) -> _FileWriter:
+        path = self.path / f"{self.path.name}_{len(self._finished)}.mcap"
+        return _FileWriter(path, *self._packing, self.topics.values())
+
+    def _finish_file(self) -> None:
+        self._file.add_metadata("rosbag2", {"serialized_metadata": _to_yaml(self._metadata())})
+        self._file.finish()
+        self._finished.append(self._file.part)
+
     @contextlib.contextmanager
     def _giving_up(self) -> Iterator[None]:
         try:
@@ -295,30 +295,23 @@ class BagWriter:
 
     def _given_up(self, error: OSError) -> KeepawayError:
         """Let go of a file that cannot be written; what is still in memory is lost."""
-        if self._file is not None:
-            with contextlib.suppress(OSError):
-                self._file.close()
-        self._file = None
+        self._file.abandon()
+        self._is_open = False
         return KeepawayError(
             f"{self.path} cannot be written any more: {error}; scripts/repair_bag.py makes a whole"
             " bag of what is there"
         )
 
-    @property
-    def _mcap_path(self) -> Path:
-        return self.path / f"{self.path.name}_0.mcap"
-
     def _metadata(self) -> dict[str, Any]:
-        start = self._start if self.message_count else 0
-        span = {
-            "duration": {"nanoseconds": max(0, self._end - start)},
-            "starting_time": {"nanoseconds_since_epoch": start},
-            "message_count": self.message_count,
-        }
+        """What rosbag2 says of a bag: here, of what was written so far."""
+        parts = [*self._finished, self._file.part]
+        written = [part for part in parts if part.message_count]
+        start = min((part.start for part in written), default=0)
+        end = max((part.end for part in written), default=0)
         return {
             "version": 9,
             "storage_identifier": "mcap",
-            **span,
+            **_span(start, end, self.message_count),
             "topics_with_message_count": [
                 {
                     "topic_metadata": {
@@ -334,11 +327,104 @@ class BagWriter:
             ],
             "compression_format": "",  # of whole files or messages; chunks are MCAP's own matter
             "compression_mode": "",
-            "relative_file_paths": [self._mcap_path.name],
-            "files": [{"path": self._mcap_path.name, **span}],
+            "relative_file_paths": [part.name for part in parts],
+            "files": [{"path": part.name, **_span(*part[1:])} for part in parts],
             "custom_data": self._info or None,
             "ros_distro": "jazzy",
         }
+
+
+class _Part(NamedTuple):
+    """What is in one file of a bag."""
+
+    name: str
+    start: int  # [ns] the first time of its messages; 0 without messages
+    end: int
+    message_count: int
+
+
+class _FileWriter:
+    """One MCAP file of a bag, while it is written."""
+
+    def __init__(
+        self, path: Path, chunk_size: int, compression: CompressionType, topics: Collection[Topic]
+    ) -> None:
+        self._name = path.name
+        self._start = self._end = self._message_count = 0
+        self._chunk_size, self._num_bytes = chunk_size, 0
+        self._flushes = self._flushed_messages = 0
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._stream = path.open("xb")
+        self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=compression)
+        self._mcap.start(profile="ros2", library=f"keepaway {__version__}")
+        for topic in topics:
+            self.add_topic(topic)
+
+    @property
+    def num_chunks(self) -> int:
+        """About so many chunks are in the file: full ones, and those that a flush ended."""
+        return self._num_bytes // self._chunk_size + self._flushes
+
+    def add_topic(self, topic: Topic) -> None:
+        """Register a topic with its type."""
+        if topic.message_type not in self._schemas:
+            self._schemas[topic.message_type] = self._mcap.register_schema(
+                topic.message_type, "ros2msg", topic.definition.encode()
+            )
+        self._channels[topic.name] = self._mcap.register_channel(
+            topic.name,
+            "cdr",
+            self._schemas[topic.message_type],
+            {
+                "offered_qos_profiles": _to_yaml([topic.qos.to_dict()]),
+                "topic_type_hash": topic.type_hash,
+            },
+        )
+
+    @property
+    def part(self) -> _Part:
+        """What is in it so far."""
+        return _Part(self._name, self._start, self._end, self._message_count)
+
+    def write(self, topic: str, log_time: int, data: bytes, sequence: int) -> None:
+        self._mcap.add_message(self._channels[topic], log_time, data, log_time, sequence)
+        self._start = min(self._start, log_time) if self._message_count else log_time
+        self._end = max(self._end, log_time)
+        self._message_count += 1
+        self._num_bytes += MESSAGE_OVERHEAD + len(data)
+
+    def add_metadata(self, name: str, entries: dict[str, str]) -> None:
+        self._mcap.add_metadata(name, entries)
+
+    def attach(self, name: str, data: bytes, media_type: str) -> None:
+        self._mcap.add_attachment(0, 0, name, media_type, data)
+
+    def flush(self) -> None:
+        """End the chunk and give everything to the operating system."""
+        if self._message_count > self._flushed_messages:
+            self._flushes += 1
+            self._flushed_messages = self._message_count
+        self._mcap.flush()
+
+    def finish(self) -> None:
+        """Write the index and let go of it."""
+        self._mcap.finish()
+        self._stream.close()
+
+    def abandon(self) -> None:
+        """Leave the file as it is on the disk."""
+        with contextlib.suppress(OSError):
+            self._stream.close()
+
+
+def _span(start: int, end: int, message_count: int) -> dict[str, Any]:
+    """When a file or a bag begins, and how much is in it, as rosbag2 writes it."""
+    return {
+        "duration": {"nanoseconds": end - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "message_count": message_count,
+    }
 
 
 class BagReader:
@@ -627,7 +713,8 @@ def _mcap_files(path: Path) -> list[Path]:
     listed = sorted(path.glob("*.mcap"), key=_file_number)
     if not listed:
         raise KeepawayError(f"{path}: no bag there (a folder with an .mcap file, or such a file)")
-    return listed
+    # A writer that was killed, or found the disk full, may only just have begun its last file.
+    return [file for file in listed if file.stat().st_size >= len(_MAGIC)] or listed[:1]
 
 
 def _file_number(path: Path) -> int:
