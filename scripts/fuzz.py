@@ -437,7 +437,9 @@ def live_page() -> Callable[[bytes], object]:
     page = LiveMatch(lambda event: json.loads(event[1]))
 
     def feed(data: bytes) -> object:
-        return page.feed(types[data[0] % len(types)] if data else messages.MATCH, data[1:])
+        names = page.feed(types[data[0] % len(types)] if data else messages.MATCH, data[1:])
+        page.show()
+        return names
 
     return feed
 

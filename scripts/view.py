@@ -14,16 +14,15 @@ machine only; --host 0.0.0.0 lets the whole network watch. What follows --ros-ar
 import argparse
 import math
 import sys
+import time
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental import EventsExecutor
 
 from keepaway_sim.episodes import MatchBag, with_markers
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.live import Server
-from keepaway_sim.nodes.spectator import Spectator
+from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
 from keepaway_sim.options import numbers_in
 from keepaway_sim.viewer import picture, replay_page
 
@@ -61,13 +60,13 @@ def watch(host: str, port: int, ros: list[str]) -> int:
     except OSError as error:
         print(f"view: {host}:{port}: {error}", file=sys.stderr)
         return 1
-    executor = EventsExecutor()
-    executor.add_node(Spectator(server.match))
+    spectator = Spectator(server.match)
     print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
     try:
         while rclpy.ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
+            spectator.poll()
+            time.sleep(POLL_PERIOD)
+    except KeyboardInterrupt:
         pass
     finally:
         server.close()

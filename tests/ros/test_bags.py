@@ -189,16 +189,22 @@ def test_a_keeper_fed_from_a_bag_answers_what_it_answered(graph: Graph, tmp_path
 
 def test_a_live_page_is_told_what_nodes_say(graph: Graph, tmp_path: Path) -> None:
     server = Server()
-    graph.add(
-        Spectator(server.match, context=graph.context, cli_args=[], use_global_arguments=False)
+    spectator = Spectator(
+        server.match, context=graph.context, cli_args=[], use_global_arguments=False
     )
+
+    def was_told() -> bool:
+        spectator.poll()
+        return len(server.match.history) == 3  # the match and two episodes
+
     graph.start_simulator(episodes=2, seed=3, record=str(tmp_path / "bag"))
     graph.start_players()
     with server.browser() as events:
-        graph.play()
-        graph.spin_until(lambda: len(server.match.history) == 3)
+        graph.play(until=was_told)
+        graph.spin_until(was_told)
         kinds = [kind for kind, _ in events.queue]
     graph.simulator.close()
+    spectator.destroy_node()
     server.close()
     assert kinds[0] == "match"
     assert kinds.count("episode") == 2

@@ -104,7 +104,7 @@ def start(
             context=graph.context, cli_args=arguments, use_global_arguments=False
         )
         started.append(node)
-        if not isinstance(node, Recorder):  # who takes its messages itself
+        if not isinstance(node, Recorder | Spectator):  # who take their messages themselves
             graph.add(node)
         if documented.hears_match:
             graph.spin_until(lambda: _knows_players(node))
@@ -117,8 +117,8 @@ def start(
 
 
 def _knows_players(node: Node) -> bool:
-    """Whether a node that hears a match has heard who plays; a recorder takes what has come."""
-    if isinstance(node, Recorder):
+    """Whether a node that hears a match has heard who plays; some take what has come themselves."""
+    if isinstance(node, Recorder | Spectator):
         node.poll()
     return any("keeper_1" in subscription.topic_name for subscription in node.subscriptions)
 

@@ -45,6 +45,7 @@ def events_of(bag: Path, monkeypatch: pytest.MonkeyPatch) -> list[Event]:
     for message in BagReader(bag).messages():
         if message.topic != "/clock":
             match.feed(message.message_type, message.data)
+            match.show()
     return sent
 
 
@@ -73,6 +74,7 @@ def test_browsers_are_not_sent_more_moments_than_they_show(bag_3v2: Path) -> Non
     for message in BagReader(bag_3v2).messages():
         if message.topic != "/clock":
             match.feed(message.message_type, message.data)
+            match.show()
     took = time.monotonic() - started
     count = sum(kind == "frame" for kind, _ in sent)
     assert 4 <= count <= took / live.FRAME_PERIOD + 2 * 4
@@ -85,6 +87,7 @@ def test_a_new_match_begins_anew(bag_3v2: Path) -> None:
     for message in [*said, *(m for m in said if m.message_type == MATCH)]:
         if message.topic != "/clock":
             match.feed(message.message_type, message.data)
+            match.show()
     assert [kind for kind, _ in match.history] == ["match"]
 
 
@@ -165,6 +168,7 @@ def test_a_browser_follows_the_match(server: Server, bag_3v2: Path) -> None:
             if message.log_time == second.start + 2_000_000_000 and not gate.is_set():
                 gate.wait(60)
             server.match.feed(message.message_type, message.data)
+            server.match.show()
             time.sleep(0.001)
 
     program = chromium.find()
@@ -172,7 +176,7 @@ def test_a_browser_follows_the_match(server: Server, bag_3v2: Path) -> None:
     with chromium.browser(program) as window:
         window.open(server.url, 1280, 800)
         assert "waiting for a match" in window.value("document.title + $('title').textContent")
-        player = threading.Thread(target=play)
+        player = threading.Thread(target=play, daemon=True)
         player.start()
         window.wait("document.getElementById('view').dataset.episode === '1'")
         assert window.value("$('live').getAttribute('aria-pressed')") == "true"

@@ -12,9 +12,11 @@ import ipaddress
 import json
 import queue
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -42,6 +44,8 @@ Event = tuple[str, str]
 class LiveMatch:
     """Makes events of a match's messages, whatever order the topics come in.
 
+    Most of what is said is never shown, so messages are kept as they came and read when they are.
+
     Attributes:
         history: the events that a browser needs to follow from now on.
     """
@@ -52,7 +56,7 @@ class LiveMatch:
         self._task: Task | None = None
         self._match: Event | None = None
         self._episodes: list[Event] = []
-        self._rows: dict[tuple[int, int], dict[str, Any]] = {}
+        self._moments: dict[tuple[int, int], _Moment] = {}
         self._sent_at = 0.0
         self._lock = threading.Lock()
 
@@ -71,33 +75,40 @@ class LiveMatch:
         Raises:
             KeepawayError: bytes that are not such a message, or not one of this match.
         """
-        said = codec(message_type).decode(data)
         try:
-            return self._hear(message_type, said)
-        except (ValueError, IndexError) as error:
+            if message_type == messages.MATCH:
+                return self._begin(codec(message_type).decode(data))
+            if self._task is not None and message_type == messages.EPISODE:
+                self._end_episode(codec(message_type).decode(data))
+            elif self._task is not None:
+                self._keep(message_type, data)
+        except (ValueError, IndexError, struct.error) as error:
             raise KeepawayError(f"a {message_type} that makes no sense here: {error}") from error
-
-    def _hear(self, message_type: str, said: dict[str, Any]) -> list[str]:
-        if message_type == messages.MATCH:
-            return self._begin(said)
-        if self._task is None:
-            return []
-        if message_type == messages.EPISODE:
-            self._end_episode(said)
-        elif message_type == messages.FIELD_STATE:
-            self._row(said)["state"] = said
-            self._send_frames()
-        elif message_type in (messages.PERCEPTION, messages.ACTION_REQUEST):
-            row = self._row(said)
-            row[f"{message_type} {said['player_index']}"] = said
-            if self._is_last(row):
-                self._send_frames()
         return []
+
+    def show(self) -> None:
+        """Send a moment, if it is time for one, of which all has been said, and episodes' ends.
+
+        All has been said of the moments before the newest.
+
+        Raises:
+            KeepawayError: bytes that are not such a message, or not one of this match.
+        """
+        newest = max(self._moments, default=None)
+        for key in sorted(self._moments):
+            is_last = self._is_last(self._moments[key])
+            if key == newest and not is_last:
+                return
+            moment = self._moments.pop(key)
+            now = time.monotonic()
+            if moment.state and (is_last or now - self._sent_at >= FRAME_PERIOD):
+                self._sent_at = now
+                self._send(("frame", json.dumps([key[0], encoded(self._frame(moment))])))
 
     def _begin(self, said: dict[str, Any]) -> list[str]:
         sides = said["field_length"], said["field_width"]
         self._task = Task(said["num_keepers"], said["num_takers"], *sides)
-        self._rows.clear()
+        self._moments.clear()
         with self._lock:
             self._match = ("match", json.dumps(match_data(said)))
             self._episodes.clear()
@@ -115,38 +126,46 @@ class LiveMatch:
             del self._episodes[:-KEPT_EPISODES]
         self._send(event)
 
-    def _row(self, said: dict[str, Any]) -> dict[str, Any]:
-        return self._rows.setdefault((said["episode"], said["cycle"]), {})
+    def _keep(self, message_type: str, data: bytes) -> None:
+        about = messages.read_saying(message_type, data)
+        moment = self._moments.setdefault((about.episode, about.cycle), _Moment())
+        if message_type == messages.FIELD_STATE:
+            moment.state, moment.outcome = data, about.outcome
+        elif message_type == messages.PERCEPTION:
+            moment.seen[about.player_index] = data
+        else:
+            moment.asked[about.player_index] = data
 
-    def _is_last(self, row: dict[str, Any]) -> bool:
+    def _is_last(self, moment: _Moment) -> bool:
         """Is it an episode's last moment, with all that is said in it?"""
         assert self._task is not None
-        ended = "state" in row and row["state"]["outcome"] != Outcome.IN_PLAY
-        return ended and len(row) > self._task.num_players
+        ended = moment.state and moment.outcome != Outcome.IN_PLAY
+        return bool(ended) and len(moment.seen) >= self._task.num_players
 
-    def _send_frames(self) -> None:
-        """Send the moments of which all has been said: those before the newest, and an end."""
-        newest, now = max(self._rows), time.monotonic()
-        for key in sorted(self._rows):
-            row = self._rows[key]
-            is_last = self._is_last(row)
-            if key == newest and not is_last:
-                return
-            del self._rows[key]
-            if "state" in row and (is_last or now - self._sent_at >= FRAME_PERIOD):
-                self._sent_at = now
-                self._send(("frame", json.dumps([key[0], encoded(self._frame(row))])))
-
-    def _frame(self, row: dict[str, Any]) -> np.ndarray:
+    def _frame(self, moment: _Moment) -> np.ndarray:
         assert self._task is not None
-        return frames(_track(self._task, row), self._task)
+        try:
+            return frames(_track(self._task, moment), self._task)
+        except (ValueError, IndexError) as error:
+            raise KeepawayError(f"a moment that makes no sense here: {error}") from error
 
 
-def _track(task: Task, row: dict[str, Any]) -> Track:
+@dataclass
+class _Moment:
+    """What was said in one cycle, as bytes."""
+
+    state: bytes = b""
+    outcome: int = Outcome.IN_PLAY
+    seen: dict[int, bytes] = field(default_factory=dict)  # perceptions by player
+    asked: dict[int, bytes] = field(default_factory=dict)  # requests by player
+
+
+def _track(task: Task, moment: _Moment) -> Track:
     """One moment's messages as a track of one cycle."""
-    num, objects, state = task.num_players, task.num_players + 1, row["state"]
-    seen = [row.get(f"{messages.PERCEPTION} {player}", {}) for player in range(num)]
-    asked = [row.get(f"{messages.ACTION_REQUEST} {player}", {}) for player in range(num)]
+    num, objects = task.num_players, task.num_players + 1
+    state = codec(messages.FIELD_STATE).decode(moment.state)
+    seen = [_decoded(messages.PERCEPTION, moment.seen.get(player)) for player in range(num)]
+    asked = [_decoded(messages.ACTION_REQUEST, moment.asked.get(player)) for player in range(num)]
     nowhere = [np.nan] * (2 * objects)
     values = np.full((1, num, task.num_keepers), np.nan)
     for player, request in enumerate(asked):
@@ -175,6 +194,11 @@ def _track(task: Task, row: dict[str, Any]) -> Track:
         requested_target=each(asked, "target", -1),
         values=values,
     )
+
+
+def _decoded(message_type: str, data: bytes | None) -> dict[str, Any]:
+    """A message's values; none of one that did not come."""
+    return {} if data is None else codec(message_type).decode(data)
 
 
 class Server:

@@ -37,6 +37,8 @@ SECOND = 1_000_000_000  # [ns]
 CYCLE_NS = round(CYCLE_TIME * SECOND)
 _STAMP = struct.Struct("<iI")
 _MOMENT = struct.Struct("<II")
+_STATE = struct.Struct("<12xIIB")  # CDR header and stamp, then episode, cycle, outcome
+_SEEN = struct.Struct("<12xB3xII")  # CDR header and stamp, then player, episode, cycle
 _REQUEST = struct.Struct("<4xB3xIIBB")  # CDR header, then ActionRequest's fields but the values
 
 
@@ -67,6 +69,29 @@ def read_moment(data: bytes) -> tuple[int, int]:
     """
     episode, cycle = _MOMENT.unpack_from(data, 16)
     return episode, cycle
+
+
+class Saying(NamedTuple):
+    """What a message of a cycle is about, without its contents."""
+
+    episode: int
+    cycle: int
+    player_index: int = -1  # who hears or asks; -1: a FieldState
+    outcome: int = 0  # of a FieldState
+
+
+def read_saying(message_type: str, data: bytes) -> Saying:
+    """What the bytes of a FieldState, Perception or ActionRequest are about.
+
+    Raises:
+        struct.error: too few bytes.
+    """
+    if message_type == FIELD_STATE:
+        episode, cycle, outcome = _STATE.unpack_from(data)
+        return Saying(episode, cycle, outcome=outcome)
+    layout = _SEEN if message_type == PERCEPTION else _REQUEST
+    player, episode, cycle = layout.unpack_from(data)[:3]
+    return Saying(episode, cycle, player)
 
 
 def clean_request(data: bytes) -> bytes:

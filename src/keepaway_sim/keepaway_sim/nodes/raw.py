@@ -1,13 +1,14 @@
-"""What recorder and replayer share: parameters, and messages of any type that pass as bytes."""
+"""What recorder, replayer and spectator share: parameters, and messages that pass as bytes."""
 
 import importlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import fields
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.recording import Qos
@@ -49,6 +50,27 @@ def message_class(message_type: str) -> type[Any]:
         return getattr(importlib.import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:
         raise KeepawayError(f"{message_type} is not installed: {error}") from error
+
+
+def listen(node: Node, topic: str, message_type: str, qos: QoSProfile) -> Subscription:
+    """A subscription whose messages wait, as bytes, to be taken; DDS keeps the last of them.
+
+    Its node must not be given to an executor, which would take them.
+    """
+    return node.create_subscription(
+        message_class(message_type), topic, _never_called, qos, raw=True
+    )
+
+
+def take_all(subscription: Subscription) -> Iterator[bytes]:
+    """Everything that has come on a subscription since the last time."""
+    with subscription.handle:
+        while taken := subscription.handle.take_message(subscription.msg_type, True):
+            yield taken[0]
+
+
+def _never_called(message: bytes) -> None:
+    """Messages are taken, not handed out."""
 
 
 def to_profile(qos: Qos, depth: int) -> QoSProfile:

@@ -39,7 +39,7 @@ from keepaway_sim.messages import (
     stamp,
     stamp_of,
 )
-from keepaway_sim.nodes.raw import declared, message_class, offered_qos, to_profile
+from keepaway_sim.nodes.raw import declared, listen, offered_qos, take_all, to_profile
 from keepaway_sim.recording import BagWriter, default_qos
 from keepaway_sim.version import code_version
 
@@ -129,10 +129,9 @@ class Recorder(Node):
         """
         count = 0
         for topic, (message_type, subscription) in list(self._subscriptions_by_topic.items()):
-            with subscription.handle:
-                while taken := subscription.handle.take_message(subscription.msg_type, True):
-                    self._record(topic, message_type, taken[0])
-                    count += 1
+            for data in take_all(subscription):
+                self._record(topic, message_type, data)
+                count += 1
         if self._is_listening_to_players():
             self._report(max(0, self.gaps.complete_until()))
         if time.monotonic() - self._flushed > FLUSH_PERIOD:
@@ -163,9 +162,7 @@ class Recorder(Node):
         if topic in self._subscriptions_by_topic:
             return
         qos = to_profile(default_qos(message_type), self.settings.history)
-        subscription = self.create_subscription(
-            message_class(message_type), topic, _never_called, qos, raw=True
-        )
+        subscription = listen(self, topic, message_type, qos)
         self._subscriptions_by_topic[topic] = message_type, subscription
 
     def _record(self, topic: str, message_type: str, data: bytes) -> None:
@@ -213,10 +210,6 @@ class Recorder(Node):
         self._times[moment] = time_ns
         if len(self._times) > REMEMBERED_CYCLES:
             del self._times[next(iter(self._times))]
-
-
-def _never_called(message: bytes) -> None:
-    """Messages are taken by `poll`."""
 
 
 def main(args: list[str] | None = None) -> int:

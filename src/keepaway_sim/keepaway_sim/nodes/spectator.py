@@ -1,18 +1,19 @@
 """The spectator's node: hears a match and shows it to browsers; see `live`."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.live import LiveMatch
 from keepaway_sim.messages import ACTION_REQUEST, EPISODE, FIELD_STATE, MATCH, PERCEPTION
-from keepaway_sim.nodes.raw import message_class, to_profile
+from keepaway_sim.nodes.raw import listen, take_all, to_profile
 from keepaway_sim.recording import Qos
 
+POLL_PERIOD = 0.02  # [s]
+EVERY_CYCLE = Qos(100)  # what is not taken in time is missed
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 
 
@@ -23,26 +24,36 @@ class Spectator(Node):
         """Listen to the match; to its players once it has said who they are."""
         super().__init__("spectator", **node_options)
         self._live = live
-        self._heard: set[str] = set()
-        self._listen("match", MATCH, to_profile(Qos(1, transient_local=True), 1))
+        self._heard: dict[str, tuple[str, Subscription]] = {}
+        self._listen("match", MATCH, Qos(1, transient_local=True))
         self._listen("field_state", FIELD_STATE)
-        self._listen("episode", EPISODE, to_profile(Qos(transient_local=True), 1000))
+        self._listen("episode", EPISODE, Qos(1000, transient_local=True))
 
-    def _listen(self, topic: str, message_type: str, qos: QoSProfile | int = 50) -> None:
-        if topic not in self._heard:
-            self._heard.add(topic)
-            hear = partial(self._hear, message_type)
-            self.create_subscription(message_class(message_type), topic, hear, qos, raw=True)
-
-    def _hear(self, message_type: str, data: bytes) -> None:
+    def poll(self) -> None:
+        """Take everything that has come, and show the newest of it."""
+        for message_type, subscription in list(self._heard.values()):
+            for data in take_all(subscription):
+                self._feed(message_type, data)
         try:
-            names = self._live.feed(message_type, data)
+            self._live.show()
         except KeepawayError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=LOG_PERIOD)
-            return
-        self._listen_to_players(names)
+            self._complain(error)
+
+    def _listen(self, topic: str, message_type: str, qos: Qos = EVERY_CYCLE) -> None:
+        if topic not in self._heard:
+            profile = to_profile(qos, qos.depth)
+            self._heard[topic] = message_type, listen(self, topic, message_type, profile)
+
+    def _feed(self, message_type: str, data: bytes) -> None:
+        try:
+            self._listen_to_players(self._live.feed(message_type, data))
+        except KeepawayError as error:
+            self._complain(error)
 
     def _listen_to_players(self, names: Sequence[str]) -> None:
         for player in names:
             self._listen(f"{player}/perception", PERCEPTION)
             self._listen(f"{player}/action_request", ACTION_REQUEST)
+
+    def _complain(self, error: KeepawayError) -> None:
+        self.get_logger().warning(str(error), throttle_duration_sec=LOG_PERIOD)
