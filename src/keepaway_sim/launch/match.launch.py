@@ -4,8 +4,8 @@ ros2 launch keepaway_sim match.launch.py task:=4v3 keeper_policy:=learn speed:=1
 """
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import LaunchConfiguration
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import Node
 
 ARGUMENTS = {
@@ -16,6 +16,8 @@ ARGUMENTS = {
     "speed": ("1.0", "simulated time over wall time; 0 plays as fast as the players answer"),
     "namespace": ("", "of every node and topic of the match"),
 }
+
+TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 
 
 def match_nodes(context: LaunchContext) -> list[Node]:
@@ -51,4 +53,6 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=default, description=description)
         for name, (default, description) in ARGUMENTS.items()
     ]
-    return LaunchDescription([*declared, OpaqueFunction(function=match_nodes)])
+    # Over shared memory, Fast DDS's default, players on a busy machine can be lost for good.
+    udp = SetEnvironmentVariable(TRANSPORTS, EnvironmentVariable(TRANSPORTS, default_value="UDPv4"))
+    return LaunchDescription([*declared, udp, OpaqueFunction(function=match_nodes)])
