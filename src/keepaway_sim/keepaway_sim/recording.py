@@ -161,8 +161,7 @@ class BagWriter:
         self._info: dict[str, str] = {}
         self.topics: dict[str, Topic] = {}
         self._counts: dict[str, int] = {}
-        self._packing = chunk_size, COMPRESSIONS[compression]
-        self._file_chunks = file_chunks
+        self._packing = chunk_size, COMPRESSIONS[compression], file_chunks
         self._finished: list[_Part] = []
         self._is_open = True
         self._flush_interval, self._flushed = flush_interval, time.monotonic()
@@ -228,7 +227,7 @@ class BagWriter:
         if topic not in self._counts:
             self.add_topic(topic, message_type)
         try:
-            if self._file.num_chunks >= self._file_chunks:
+            if self._file.room <= 0:
                 self._finish_file()
                 self._file = self._next_file()
             self._file.write(topic, log_time, data, self._counts[topic])
@@ -344,15 +343,24 @@ class _Part(NamedTuple):
 
 
 class _FileWriter:
-    """One MCAP file of a bag, while it is written."""
+    """One MCAP file of a bag, while it is written.
+
+    Attributes:
+        room: bytes that still fit; a chunk that a flush ends counts in full.
+    """
 
     def __init__(
-        self, path: Path, chunk_size: int, compression: CompressionType, topics: Collection[Topic]
+        self,
+        path: Path,
+        chunk_size: int,
+        compression: CompressionType,
+        num_chunks: int,
+        topics: Collection[Topic],
     ) -> None:
+        self.room = num_chunks * chunk_size
+        self._chunk_size = chunk_size
         self._name = path.name
-        self._start = self._end = self._message_count = 0
-        self._chunk_size, self._num_bytes = chunk_size, 0
-        self._flushes = self._flushed_messages = 0
+        self._start = self._end = self._message_count = self._flushed_messages = 0
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._stream = path.open("xb")
@@ -360,11 +368,6 @@ class _FileWriter:
         self._mcap.start(profile="ros2", library=f"keepaway {__version__}")
         for topic in topics:
             self.add_topic(topic)
-
-    @property
-    def num_chunks(self) -> int:
-        """About so many chunks are in the file: full ones, and those that a flush ended."""
-        return self._num_bytes // self._chunk_size + self._flushes
 
     def add_topic(self, topic: Topic) -> None:
         """Register a topic with its type."""
@@ -392,7 +395,7 @@ class _FileWriter:
         self._start = min(self._start, log_time) if self._message_count else log_time
         self._end = max(self._end, log_time)
         self._message_count += 1
-        self._num_bytes += MESSAGE_OVERHEAD + len(data)
+        self.room -= MESSAGE_OVERHEAD + len(data)
 
     def add_metadata(self, name: str, entries: dict[str, str]) -> None:
         self._mcap.add_metadata(name, entries)
@@ -403,7 +406,7 @@ class _FileWriter:
     def flush(self) -> None:
         """End the chunk and give everything to the operating system."""
         if self._message_count > self._flushed_messages:
-            self._flushes += 1
+            self.room -= self._chunk_size
             self._flushed_messages = self._message_count
         self._mcap.flush()
 
