@@ -69,16 +69,20 @@ def main() -> int:
 def start(args: argparse.Namespace, folder: Path) -> dict[str, "subprocess.Popen[bytes]"]:
     """Start recorders, a viewer with a browser, and the match."""
     learn = ["--keeper-policy", "learn", "--save-weights", folder / "weights", "--json"]
+    waits = ["--wait-for-recorder"] * bool(args.recorders)
     commands = {
         **{f"recorder_{n}": ["record.py", folder / f"bag_{n}"] for n in range(args.recorders)},
         "viewer": ["view.py", "--live", "--port", args.port],
-        "match": ["match.py", "--task", args.task, "--save-every", 20, *learn],
+        "match": ["match.py", "--task", args.task, "--save-every", 20, *learn, *waits],
     }
     started = {}
     for name, command in commands.items():
         words = [sys.executable, SCRIPTS / str(command[0]), *command[1:]]
         with (folder / f"{name}.out").open("wb") as out, (folder / f"{name}.err").open("wb") as err:
-            started[name] = subprocess.Popen(list(map(str, words)), stdout=out, stderr=err)
+            # Each a session of its own, as from terminals: by these Linux shares out its time.
+            started[name] = subprocess.Popen(
+                list(map(str, words)), stdout=out, stderr=err, start_new_session=True
+            )
     threading.Thread(target=browse, args=(args.port,), daemon=True).start()
     return started
 

@@ -111,7 +111,7 @@ def seat_agents(args: argparse.Namespace, task: Task) -> None:
 def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
     own = {"task", "field", "seed", "speed", "episodes", "answer_timeout"}
-    own |= {"profile", "visible_angle", "record"}
+    own |= {"profile", "visible_angle", "record", "wait_for_recorder"}
     settings = {name: value for name, value in vars(args).items() if name in own}
     players = {
         name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
@@ -312,6 +312,11 @@ def parse() -> argparse.Namespace:
     add("--visible-angle", type=float, default=360.0, help="of players [deg] (default 360)")
     add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
     add("--record", default="", metavar="DIR", help="write a bag of everything that is said")
+    add(
+        "--wait-for-recorder",
+        action="store_true",
+        help="begin with a recorder (scripts/record.py), play no faster than it follows",
+    )
     add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
     add("--save-every", type=int, default=100, help="and how often, in episodes (default 100)")
     add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")

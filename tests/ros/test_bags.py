@@ -127,7 +127,7 @@ def test_in_lock_step_the_simulator_waits_for_its_recorder(graph: Graph, tmp_pat
         """Only when the simulator has waited a while."""
         lag = graph.simulator._recorder_lag()
         furthest.append(lag)
-        if lag > 50 or graph.simulator._recorded is None or furthest[-100:] == [lag] * 100:
+        if lag > 50 or not graph.simulator._recorded or furthest[-100:] == [lag] * 100:
             recorder.poll()
 
     graph.hook = poll_rarely
@@ -138,6 +138,25 @@ def test_in_lock_step_the_simulator_waits_for_its_recorder(graph: Graph, tmp_pat
     recorder.destroy_node()
     assert max(furthest) == 51  # one more than it may be behind: then it waits
     assert len(list(MatchBag(tmp_path / "bag").episodes())) == 3
+
+
+def test_of_several_recorders_it_waits_for_the_slowest(graph: Graph, tmp_path: Path) -> None:
+    recorders = [start_recorder(graph, tmp_path / f"bag_{n}", history=60) for n in range(2)]
+    turns = iter(range(10**9))
+
+    def poll_the_second_rarely() -> None:
+        recorders[0].poll()
+        if len(graph.simulator._recorded) < 2 or next(turns) % 500 == 0:
+            recorders[1].poll()
+
+    graph.hook = poll_the_second_rarely
+    graph.start_simulator(episodes=2, seed=3, wait_for_recorder=True, answer_timeout=PATIENCE)
+    graph.start_players(policy="hold")
+    graph.play()
+    for recorder in recorders:
+        assert recorder.finish().startswith("nothing is missing of ")
+        recorder.destroy_node()
+    assert by_topic(tmp_path / "bag_0") == by_topic(tmp_path / "bag_1")
 
 
 def test_what_a_recorder_loses_it_names(graph: Graph, tmp_path: Path) -> None:

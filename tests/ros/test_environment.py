@@ -1,8 +1,10 @@
 """The environment that scripts/setup makes: messages go over DDS, and stay on this machine."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import rclpy
@@ -11,6 +13,19 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
 from keepaway_msgs.msg import Perception
+
+ROOT = Path(__file__).resolve().parents[2]
+LAST = 1000
+READER = f"""
+import rclpy
+from keepaway_msgs.msg import Perception
+rclpy.init()
+node, heard = rclpy.create_node("reader"), []
+node.create_subscription(Perception, "perception", lambda said: heard.append(said.cycle), 200)
+while {LAST} not in heard:
+    rclpy.spin_once(node)
+print("heard {LAST}", flush=True)
+"""
 
 
 def test_a_perception_goes_over_dds_whole(ros_domain: int) -> None:
@@ -38,10 +53,40 @@ def test_the_index_knows_the_messages() -> None:
 
 
 def test_python_alone_is_enough_to_find_ros(tmp_path: Path) -> None:
-    names = ["ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTDDS_BUILTIN_TRANSPORTS"]
+    names = ["ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"]
     program = f"import os, rclpy; print(*map(os.environ.get, {names}))"
     bare = {"HOME": str(tmp_path), "PATH": os.defpath}
     said = subprocess.run(
         [sys.executable, "-c", program], env=bare, capture_output=True, text=True, check=True
     )
-    assert said.stdout == "LOCALHOST UDPv4\n"
+    assert said.stdout == f"LOCALHOST {ROOT / 'src/keepaway_sim/fastdds.xml'}\n"
+
+
+def test_what_a_slow_reader_lost_it_has_soon(ros_domain: int) -> None:
+    """A reader is frozen while more is said than its queue holds, so that the end is lost."""
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    node = rclpy.create_node("writer", context=context)
+    publisher = node.create_publisher(Perception, "perception", 200)
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros_domain)}
+    reader = subprocess.Popen(
+        [sys.executable, "-c", READER], env=environment, stdout=subprocess.PIPE, text=True
+    )
+    assert reader.stdout is not None
+    try:
+        while not publisher.get_subscription_count():
+            time.sleep(0.05)
+        publisher.publish(Perception())
+        time.sleep(1.0)
+        reader.send_signal(signal.SIGSTOP)
+        for cycle in range(1, LAST + 1):
+            publisher.publish(Perception(cycle=cycle))
+        thawed = time.monotonic()
+        reader.send_signal(signal.SIGCONT)
+        assert reader.stdout.readline() == f"heard {LAST}\n"
+        assert time.monotonic() - thawed < 1.0  # by default 2 s
+    finally:
+        reader.kill()
+        reader.communicate()
+        node.destroy_node()
+        context.shutdown()

@@ -94,6 +94,16 @@ def read_saying(message_type: str, data: bytes) -> Saying:
     return Saying(episode, cycle, player)
 
 
+def read_time(data: bytes) -> int:
+    """The nanoseconds in a builtin_interfaces/Time's bytes.
+
+    Raises:
+        struct.error: too few bytes.
+    """
+    sec, nanosec = _STAMP.unpack_from(data, 4)
+    return int(sec) * SECOND + int(nanosec)
+
+
 def clean_request(data: bytes) -> bytes:
     """An ActionRequest's bytes with its padding zeroed.
 
@@ -256,8 +266,7 @@ def stamp_of(message_type: str, data: bytes) -> int | None:
     """When a message was stamped, simulated [ns]; None for types without a stamp at the front."""
     if not _has_stamp(message_type):
         return None
-    sec, nanosec = _STAMP.unpack_from(data, 4)
-    return int(sec) * SECOND + int(nanosec)
+    return read_time(data)
 
 
 @functools.cache

@@ -3,6 +3,7 @@
 ros2 launch keepaway_sim match.launch.py task:=4v3 keeper_policy:=learn speed:=1.0
 """
 
+from ament_index_python import get_package_share_path
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
@@ -17,7 +18,7 @@ ARGUMENTS = {
     "namespace": ("", "of every node and topic of the match"),
 }
 
-TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
 def match_nodes(context: LaunchContext) -> list[Node]:
@@ -53,6 +54,6 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=default, description=description)
         for name, (default, description) in ARGUMENTS.items()
     ]
-    # Over shared memory, Fast DDS's default, players on a busy machine can be lost for good.
-    udp = SetEnvironmentVariable(TRANSPORTS, EnvironmentVariable(TRANSPORTS, default_value="UDPv4"))
-    return LaunchDescription([*declared, udp, OpaqueFunction(function=match_nodes)])
+    own = str(get_package_share_path("keepaway_sim") / "fastdds.xml")
+    profiles = SetEnvironmentVariable(PROFILES, EnvironmentVariable(PROFILES, default_value=own))
+    return LaunchDescription([*declared, profiles, OpaqueFunction(function=match_nodes)])

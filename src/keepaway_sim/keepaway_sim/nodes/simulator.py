@@ -11,6 +11,7 @@ import gc
 import json
 import math
 import signal
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
@@ -41,7 +42,7 @@ from keepaway_sim.messages import FieldMessages
 from keepaway_sim.nodes.health import diagnostics
 from keepaway_sim.nodes.inbox import PROCESS_SIZE, Inbox
 from keepaway_sim.nodes.raw import declared
-from keepaway_sim.nodes.voice import LATCHED, QUEUE, Voice
+from keepaway_sim.nodes.voice import ALL, LATCHED, QUEUE, Voice
 from keepaway_sim.recording import BagWriter
 from keepaway_sim.roster import Roster
 from keepaway_sim.task import Outcome, Task
@@ -80,7 +81,7 @@ class Settings:
     record: str = ""  # folder of a bag to write; empty: none
     record_info: str = "{}"  # JSON object of texts, written into the bag
     record_attachments: str = "{}"  # JSON object, name -> file to put into the bag
-    wait_for_recorder: bool = False  # play no faster than a recorder's node follows
+    wait_for_recorder: bool = False  # play no faster than recorders' nodes follow
 
     def __post_init__(self) -> None:
         for name in ("seed", "episodes", "first_episode", "speed"):
@@ -125,7 +126,7 @@ class Simulator(Node):
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
-        self._recorded: int | None = None  # [ns] what a recorder's node has reached
+        self._recorded: dict[bytes, int] = {}  # [ns] what recorders have reached, by publisher
         self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
         self._health_at, self._health_cycles = time.monotonic(), 0
         self._time_played = 0.0  # [s]
@@ -202,13 +203,13 @@ class Simulator(Node):
                 ("status", AgentStatus, self._on_status, LATCHED),
             )
         ]
+        self._inboxes.append(Inbox(self, Time, "recorded", self._on_recorded, ALL))
         for name, serve in (
             ("start", self._on_start),
             ("pause", self._on_pause),
             ("reset", self._on_reset),
         ):
             self.create_service(Trigger, name, serve)
-        self.create_subscription(Time, "recorded", self._on_recorded, LATCHED)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._health = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
         self.create_timer(HEALTH_PERIOD, self._say_health)
@@ -244,8 +245,13 @@ class Simulator(Node):
             throttle_duration_sec=LOG_PERIOD,
         )
 
-    def _on_recorded(self, time_: Time) -> None:
-        self._recorded = time_.sec * messages.SECOND + time_.nanosec
+    def _on_recorded(self, data: bytes, gid: bytes) -> None:
+        try:
+            self._recorded[gid] = messages.read_time(data)
+        except struct.error as error:
+            self.get_logger().warning(
+                f"recorded: ignored: {error}", throttle_duration_sec=LOG_PERIOD
+            )
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         given = {p.name: p.value for p in parameters if p.name in CHANGEABLE}
@@ -294,24 +300,30 @@ class Simulator(Node):
     def _missing(self) -> str:
         """Names of those without whom it cannot go on: at first everybody, later anybody."""
         if not self._first_counts:
-            waits = self.settings.wait_for_recorder and self._recorded is None
+            recorders = max(1, self.count_publishers("recorded"))
+            waits = self.settings.wait_for_recorder and len(self._recorded) < recorders
             return ", ".join([*self.roster.absent, *["a recorder"] * waits])
         return "any player" if self.roster.is_deserted else ""
 
     def _let_recorder_follow(self) -> None:
-        """Wait for a recorder that has fallen far behind; for one that stays there, no longer."""
+        """Wait for recorders that have fallen far behind; for one that stays there, no longer."""
         until = time.monotonic() + self.settings.answer_timeout
         while self._recorder_lag() > RECORDER_LAG and not self._is_over():
             self._spin(RESEND_PERIOD)
             if time.monotonic() > until:
-                self.get_logger().error("the recorder is missing: the match goes on without it")
-                self._recorded = None
+                self.get_logger().error("a recorder is missing: the match goes on without it")
+                now = self._messages.stamp_ns()
+                self._recorded = {
+                    gid: reached
+                    for gid, reached in self._recorded.items()
+                    if now - reached <= RECORDER_LAG * messages.CYCLE_NS
+                }
 
     def _recorder_lag(self) -> int:
-        """How far the recorder is behind [cycles]; 0 if nobody waits for it."""
-        if not self.settings.wait_for_recorder or self._recorded is None:
+        """How far the slowest recorder is behind [cycles]; 0 if nobody waits for it."""
+        if not self.settings.wait_for_recorder or not self._recorded:
             return 0
-        return (self._messages.stamp_ns() - self._recorded) // messages.CYCLE_NS
+        return (self._messages.stamp_ns() - min(self._recorded.values())) // messages.CYCLE_NS
 
     def _send(self) -> None:
         """Tell everybody about this moment: first the players, who then think meanwhile."""
