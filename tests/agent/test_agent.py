@@ -51,6 +51,24 @@ def test_a_perception_that_comes_twice_is_answered_twice_and_taught_once():
     assert careful.episodes == plain.episodes == 1
 
 
+def test_a_view_may_be_made_of_any_kinds_of_arrays():
+    plain, other = learner(), learner()
+    for cycle in range(20):
+        usual = perceived(cycle=cycle)
+        wide = np.empty((6, 4))
+        wide[:, ::2] = usual.view.position
+        unusual = View(
+            wide[:, ::2],
+            usual.view.age.astype(np.int64),
+            usual.view.cycles_to_ball[::-1],
+            True,
+            cycle,
+        )
+        answer = other.perceive(usual._replace(view=unusual))
+        assert answer[:2] == plain.perceive(usual)[:2]
+    assert same_weights(plain, other)
+
+
 def test_a_perception_from_the_past_is_not_answered():
     agent = learner()
     agent.perceive(perceived(episode=1, cycle=3))

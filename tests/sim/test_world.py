@@ -75,6 +75,20 @@ def test_a_field_alone_is_that_field_among_many(task, config):
     assert many.perceptions.episode.max() > 0  # kick-offs were among them
 
 
+def test_requests_may_be_any_arrays_of_whole_numbers_but_of_no_other_shape():
+    plain, other = (started(Task(3, 2), profile("2005"), [1, 2]) for _ in range(2))
+    requests = Requests(plain, [1, 2])
+    for _ in range(50):
+        action, target = requests.draw()
+        plain.step(action, target)
+        other.step(action.astype(np.int8), np.asfortranarray(target))
+        assert_same(snapshot(plain, 1), snapshot(other, 1))
+    for wrong in (action[:1], action.T, action.ravel()):
+        with pytest.raises(KeepawayError, match=r"requests of shape .* give .2, 5"):
+            plain.step(wrong, target)
+    assert_same(snapshot(plain, 0), snapshot(other, 0))
+
+
 @pytest.mark.parametrize(("task", "config"), CASES[:2])
 def test_positions_lie_on_a_grid_that_every_place_represents(task, config):
     world = started(task, config, list(range(40)))

@@ -12,6 +12,7 @@ import numpy as np
 from keepaway_agent import policies, sarsa
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.cmac import make_tiling
+from keepaway_agent.compiled import entry_point
 from keepaway_agent.errors import AgentError
 from keepaway_agent.policies import View, make_player
 from keepaway_agent.sarsa import SarsaConfig
@@ -131,8 +132,6 @@ class Agent:
             self.config.ordering,
             self.config.decision_interval,
         )
-        keeps = self.role == Role.KEEPER
-        self._rule = policies.keeper_decision if keeps else policies.taker_decision
         self._order = np.zeros(facts.num_players, dtype=np.int64)
         self._random = policy_generator(facts.seed, index, first_episode=facts.first_episode)
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
@@ -205,7 +204,7 @@ class Agent:
 
     def _decide(self, view: View) -> Decision:
         action, target, chose = self._rule(
-            self.learners, 0, self._player, view, self._uniforms, self._order
+            self.learners, 0, self._player, _as_compiled(view), self._uniforms, self._order
         )
         if not chose:
             return Decision(int(action), int(target), _NO_VALUES)
@@ -222,12 +221,26 @@ class Agent:
             self.hours += cycle * self.facts.cycle_time / 3600
 
     def _compile(self) -> None:
-        """Decide once on nothing, so that the first decision of the match is not late."""
+        """Compile what it decides by, so that the first decision of the match is not late."""
+        keeps = self.role == Role.KEEPER
+        rule = policies.keeper_decision if keeps else policies.taker_decision
         num = self.facts.num_players
-        far = np.full(num + 1, policies.MAX_KNOWN_AGE + 1, dtype=np.int32)
-        nowhere = View(np.zeros((num + 1, 2)), far, far[:-1], True, 0)
-        self._rule(self.learners, 0, self._player, nowhere, self._uniforms, self._order)
+        ages = np.zeros(num + 1, dtype=np.int32)
+        nothing = View(np.zeros((num + 1, 2)), ages, ages[:-1], False, 0)
+        arguments = self.learners, 0, self._player, nothing, self._uniforms, self._order
+        self._rule = entry_point(rule, *arguments)
         policies.end_episode(self.learners, 0, self._player, 0, int(Outcome.ABORTED))
+
+
+def _as_compiled(view: View) -> View:
+    """The same view as the machine code takes it, whatever kinds of numbers it was made of."""
+    return View(
+        np.ascontiguousarray(view.position, dtype=np.float64),
+        np.ascontiguousarray(view.age, dtype=np.int32),
+        np.ascontiguousarray(view.cycles_to_ball, dtype=np.int32),
+        view.ball_kickable,
+        view.cycle,
+    )
 
 
 _NO_VALUES = np.empty(0)

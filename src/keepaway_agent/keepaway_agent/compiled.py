@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import njit, typeof
 
 
 def drop_stale_cache(package: Path) -> None:
@@ -45,6 +45,17 @@ def compiled(function: Callable[..., Any]) -> Any:
         "_nrt": False,
     }
     return njit(**settings)(function)
+
+
+def entry_point(function: Any, *arguments: Any) -> Callable[..., Any]:
+    """The machine code of a compiled function, for arguments of the types of these.
+
+    A call of the function itself looks up the type of every array first, which takes longer than
+    a decision. This does not, so it must only get arguments of the same types: an array is checked
+    no further than by its number of axes and the size of its numbers.
+    """
+    code: Callable[..., Any] = function.compile(tuple(typeof(value) for value in arguments))
+    return code
 
 
 drop_stale_cache(Path(__file__).parent)

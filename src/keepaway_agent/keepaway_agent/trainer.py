@@ -23,7 +23,7 @@ import numpy as np
 from keepaway_agent import policies, sarsa
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.cmac import Tiling, make_tiling
-from keepaway_agent.compiled import compiled
+from keepaway_agent.compiled import compiled, entry_point
 from keepaway_agent.errors import AgentError
 from keepaway_agent.policies import (
     Player,
@@ -183,7 +183,20 @@ class Trainer:
         self._policy = np.zeros(shape, dtype=np.int64)
         self._action = np.zeros(shape, dtype=np.int64)
         self._target = np.zeros(shape, dtype=np.int64)
-        self._order = np.zeros(task.num_players, dtype=np.int64)
+        self._for_decide_all = (
+            self._world.perceptions,
+            self._teams[Role.KEEPER].learners,
+            self._teams[Role.TAKER].learners,
+            self._policy,
+            self._teams[Role.KEEPER].player,
+            self._teams[Role.TAKER].player,
+            self._streams.uniforms,
+            self._streams.cursor,
+            np.zeros(task.num_players, dtype=np.int64),
+            self._action,
+            self._target,
+        )
+        self._decide_all = entry_point(decide_all, 0, num_fields, *self._for_decide_all)
         self._lives: list[_Life | None] = [None] * num_fields
         self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
         self._watched: set[int] = set()  # fields whose trial has a `watch`
@@ -290,21 +303,7 @@ class Trainer:
         """Let players of fields first..last-1 answer, and pay those whose episode is over."""
         self._streams.refill()
         unused = self._streams.cursor.copy()
-        decide_all(
-            first,
-            last,
-            self._world.perceptions,
-            self._teams[Role.KEEPER].learners,
-            self._teams[Role.TAKER].learners,
-            self._policy,
-            self._teams[Role.KEEPER].player,
-            self._teams[Role.TAKER].player,
-            self._streams.uniforms,
-            self._streams.cursor,
-            self._order,
-            self._action,
-            self._target,
-        )
+        self._decide_all(first, last, *self._for_decide_all)
         for number in self._watched.intersection(range(first, last)):
             self._show(number, unused)
 

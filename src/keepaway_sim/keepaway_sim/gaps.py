@@ -8,15 +8,18 @@ is counted from the first cycle in which every topic was heard, and its report s
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass, field
 
-from keepaway_sim.messages import ACTION_REQUEST, CYCLE_NS, FIELD_STATE, PERCEPTION
+from keepaway_sim.messages import (
+    ACTION_REQUEST,
+    CYCLE_NS,
+    FIELD_STATE,
+    PERCEPTION,
+    read_saying,
+)
 from keepaway_sim.recording import BagReader
 
-_PERCEPTION = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome, decision due
-_FIELD_STATE = struct.Struct("<4xiIII")  # stamp, episode, cycle
-_ACTION_REQUEST = struct.Struct("<4xB3xII")  # player, episode, cycle
+_EVERY_CYCLE = (PERCEPTION, FIELD_STATE, ACTION_REQUEST)
 _FORGET_AFTER = 1000  # [decisions] an answer that is so late does not come any more
 
 
@@ -53,17 +56,15 @@ class GapCounter:
 
     def feed(self, topic: str, message_type: str, data: bytes) -> None:
         """Count one message. Other types than the three that come every cycle are passed over."""
-        if message_type == PERCEPTION:
-            sec, nanosec, player, episode, cycle, _, due = _PERCEPTION.unpack_from(data)
-            if self._count(topic, sec * 1_000_000_000 + nanosec, cycle) and due:
-                self._newest = (episode, cycle)
-                self._pair(player, self._newest, True)
-        elif message_type == FIELD_STATE:
-            sec, nanosec, _, cycle = _FIELD_STATE.unpack_from(data)
-            self._count(topic, sec * 1_000_000_000 + nanosec, cycle)
-        elif message_type == ACTION_REQUEST:
-            player, episode, cycle = _ACTION_REQUEST.unpack_from(data)
-            self._pair(player, (episode, cycle), False)
+        if message_type not in _EVERY_CYCLE:
+            return
+        about = read_saying(message_type, data)
+        moment = about.episode, about.cycle
+        if message_type == ACTION_REQUEST:
+            self._pair(about.player_index, moment, False)
+        elif self._count(topic, about.time_ns, about.cycle) and about.decision_due:
+            self._newest = moment
+            self._pair(about.player_index, moment, True)
 
     @property
     def received(self) -> int:

@@ -36,9 +36,8 @@ MARKERS = "visualization_msgs/msg/MarkerArray"
 SECOND = 1_000_000_000  # [ns]
 CYCLE_NS = round(CYCLE_TIME * SECOND)
 _STAMP = struct.Struct("<iI")
-_MOMENT = struct.Struct("<II")
-_STATE = struct.Struct("<12xIIB")  # CDR header and stamp, then episode, cycle, outcome
-_SEEN = struct.Struct("<12xB3xII")  # CDR header and stamp, then player, episode, cycle
+_STATE = struct.Struct("<4xiIIIB")  # CDR header, then stamp, episode, cycle, outcome
+_SEEN = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome, decision due
 _REQUEST = struct.Struct("<4xB3xIIBB")  # CDR header, then ActionRequest's fields but the values
 
 
@@ -61,23 +60,15 @@ def read_request(data: bytes) -> Request:
     return Request(*_REQUEST.unpack_from(data))
 
 
-def read_moment(data: bytes) -> tuple[int, int]:
-    """Episode and cycle in a Perception's bytes.
-
-    Raises:
-        struct.error: too few bytes.
-    """
-    episode, cycle = _MOMENT.unpack_from(data, 16)
-    return episode, cycle
-
-
 class Saying(NamedTuple):
     """What a message of a cycle is about, without its contents."""
 
     episode: int
     cycle: int
     player_index: int = -1  # who hears or asks; -1: a FieldState
-    outcome: int = 0  # of a FieldState
+    time_ns: int = -1  # simulated, its stamp; -1: an ActionRequest, which has none
+    outcome: int = 0  # of a FieldState or Perception
+    decision_due: bool = False  # of a Perception
 
 
 def read_saying(message_type: str, data: bytes) -> Saying:
@@ -87,10 +78,12 @@ def read_saying(message_type: str, data: bytes) -> Saying:
         struct.error: too few bytes.
     """
     if message_type == FIELD_STATE:
-        episode, cycle, outcome = _STATE.unpack_from(data)
-        return Saying(episode, cycle, outcome=outcome)
-    layout = _SEEN if message_type == PERCEPTION else _REQUEST
-    player, episode, cycle = layout.unpack_from(data)[:3]
+        sec, nanosec, episode, cycle, outcome = _STATE.unpack_from(data)
+        return Saying(episode, cycle, -1, sec * SECOND + nanosec, outcome)
+    if message_type == PERCEPTION:
+        sec, nanosec, player, episode, cycle, outcome, due = _SEEN.unpack_from(data)
+        return Saying(episode, cycle, player, sec * SECOND + nanosec, outcome, due)
+    player, episode, cycle = _REQUEST.unpack_from(data)[:3]
     return Saying(episode, cycle, player)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from keepaway_sim import physics, referee, skills, vision
-from keepaway_sim.compiled import compiled, compiled_apart
+from keepaway_sim.compiled import compiled, compiled_apart, entry_point
 from keepaway_sim.config import NEVER, Config, pack
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.geometry import TWO_PI, length
@@ -65,11 +65,21 @@ class World:
         self._bodies = physics.Bodies(num_fields, self._radius, side)
         self._streams = RandomStreams(num_fields, reserve=num * (num + 12) + 16)
         self._touched = np.zeros(num_fields, dtype=np.bool_)
-        self._scratch = (
-            np.zeros((num + 1, 2)),
-            np.zeros(num + 1),
-            np.zeros(num + 1, dtype=np.bool_),
-        )
+        self._compile()
+
+    def _compile(self) -> None:
+        """Bring together what the compiled functions work on; no array is ever replaced."""
+        num = self.task.num_players
+        collide = np.zeros((num + 1, 2)), np.zeros(num + 1), np.zeros(num + 1, dtype=np.bool_)
+        world = self._constants, self.state, self.perceptions, self._memory, self._speech
+        places = self._bodies.motion, self._bodies.place
+        random = self._streams.uniforms, self._streams.cursor
+        self._for_start = *world, *random
+        self._for_act = *world, *places, collide[0], *random
+        self._for_settle = *world, *places, self._radius, self._touched, collide, *random
+        nothing = np.zeros((self.num_fields, num), dtype=np.int64)
+        self._act = entry_point(_act, *self._for_act, nothing, nothing)
+        self._settle = entry_point(_settle, *self._for_settle)
 
     @property
     def commands(self) -> np.ndarray:
@@ -85,16 +95,7 @@ class World:
         if not 0 <= field < self.num_fields:
             raise KeepawayError(f"field={field}: this world has fields 0..{self.num_fields - 1}")
         self._streams.seed(field, np.random.default_rng(seed))
-        _start(
-            self._constants,
-            self.state,
-            self.perceptions,
-            self._memory,
-            self._speech,
-            self._streams.uniforms,
-            self._streams.cursor,
-            field,
-        )
+        _start(*self._for_start, field)
 
     def stop(self, field: int) -> None:
         """Let a field rest: it is not simulated until it is started again."""
@@ -118,41 +119,26 @@ class World:
                 marked keeper's index, ignored for other actions.
 
         Raises:
-            KeepawayError: a request that its player cannot carry out; nothing was played.
+            KeepawayError: a request that its player cannot carry out, or arrays of another
+                shape; nothing was played.
         """
+        action, target = self._checked(action), self._checked(target)
         self._streams.refill()
-        random = self._streams.uniforms, self._streams.cursor
-        illegal = _act(
-            self._constants,
-            self.state,
-            self.perceptions,
-            self._memory,
-            self._speech,
-            self._bodies.motion,
-            self._bodies.place,
-            self._scratch[0],
-            action,
-            target,
-            *random,
-        )
+        illegal = self._act(*self._for_act, action, target)
         if illegal >= 0:
             self._refuse(illegal, action, target)
         touched = self._bodies.move()
         self._touched[:] = False
         self._touched[touched] = True
-        _settle(
-            self._constants,
-            self.state,
-            self.perceptions,
-            self._memory,
-            self._speech,
-            self._bodies.motion,
-            self._bodies.place,
-            self._radius,
-            self._touched,
-            self._scratch,
-            *random,
-        )
+        self._settle(*self._for_settle)
+
+    def _checked(self, request: np.ndarray) -> np.ndarray:
+        """The requests as the compiled code takes them."""
+        if request.shape != self.state.action.shape:
+            raise KeepawayError(
+                f"requests of shape {request.shape}: give {self.state.action.shape}"
+            )
+        return np.ascontiguousarray(request, dtype=np.int64)
 
     def _refuse(self, illegal: int, action: np.ndarray, target: np.ndarray) -> None:
         field, player = divmod(illegal, self.task.num_players)
@@ -240,7 +226,7 @@ def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
 
 
 @compiled_apart
-def _act(c, state, s, m, speech, motion, place, acceleration, action, target, uniforms, cursor):
+def _act(c, state, s, m, speech, motion, place, acceleration, uniforms, cursor, action, target):
     """Requests become commands, commands become this cycle's velocities.
 
     Returns:

@@ -119,11 +119,18 @@ class Inbox(Waitable):
         self._place = wait_set.add_subscription(self._subscription)
 
     def is_ready(self, wait_set: Any) -> bool:
-        """Has something come?"""
-        return bool(wait_set.is_ready("subscription", self._place))
+        """Hand on what has come, so that nothing is left to be done by the executor.
 
-    def take_data(self) -> tuple[bytes, bytes] | None:
-        """The oldest message and its publisher; None where somebody was told of it in vain."""
+        It would make a task of every message, which takes longer than taking it.
+        """
+        if wait_set.is_ready("subscription", self._place):
+            taken = self._take()
+            if taken is not None:  # the executor may have been told of it in vain
+                self._hear(*taken)
+        return False
+
+    def _take(self) -> tuple[bytes, bytes] | None:
+        """The oldest message and its publisher; None if there is none."""
         with self._subscription:
             missing = _RCL.rcl_take_serialized_message(
                 self._subscription.pointer, self._bytes, self._info, None
@@ -132,10 +139,11 @@ class Inbox(Waitable):
             return None
         return ctypes.string_at(self._bytes.buffer, self._bytes.length), bytes(self._info.gid)
 
-    async def execute(self, taken: tuple[bytes, bytes] | None) -> None:
-        """Hand it on."""
-        if taken is not None:
-            self._hear(*taken)
+    def take_data(self) -> None:
+        """Never called, as it is never ready."""
+
+    async def execute(self, taken_data: None) -> None:
+        """Never called, as it is never ready."""
 
     def destroy(self) -> None:
         """Listen no longer."""

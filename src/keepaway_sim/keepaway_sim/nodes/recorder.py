@@ -34,8 +34,7 @@ from keepaway_sim.messages import (
     MARKERS,
     MATCH,
     PERCEPTION,
-    read_moment,
-    read_request,
+    read_saying,
     stamp,
     stamp_of,
 )
@@ -199,11 +198,10 @@ class Recorder(Node):
         if own is not None:
             self._last_time = own
             if message_type == PERCEPTION:
-                self._remember(read_moment(data), own)
+                self._remember(read_saying(PERCEPTION, data)[:2], own)
             return own
         if message_type == ACTION_REQUEST:
-            asked = read_request(data)
-            return self._times.get((asked.episode, asked.cycle), self._last_time)
+            return self._times.get(read_saying(ACTION_REQUEST, data)[:2], self._last_time)
         return self._last_time
 
     def _remember(self, moment: tuple[int, int], time_ns: int) -> None:

@@ -19,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
@@ -119,7 +118,6 @@ class Simulator(Node):
         task = Task.parse(self.settings.task, self.settings.field)
         self.world = World(task, self._declare_config())
         begin_match(self.world, self.settings.seed, self.settings.first_episode)
-        compile_world(task, self.world.config)
         self.roster = Roster(task, self.world.config)
         self.num_finished, self.num_cycles = self.settings.first_episode, 0
         self._is_running, self._is_reset = self.settings.autostart, False
@@ -148,7 +146,7 @@ class Simulator(Node):
             began = time.monotonic()
             self._let_recorder_follow()
             self._send()
-            if not self._is_over():
+            if not self._is_played():
                 self._collect()
                 self._step()
             self._time_played += time.monotonic() - began
@@ -279,8 +277,11 @@ class Simulator(Node):
     # A cycle.
 
     def _is_over(self) -> bool:
-        played = 0 < self.settings.episodes <= self.num_finished
-        return played or self._is_told_to_end() or not self.context.ok()
+        return self._is_played() or self._is_told_to_end() or not self.context.ok()
+
+    def _is_played(self) -> bool:
+        """Have all episodes ended?"""
+        return 0 < self.settings.episodes <= self.num_finished
 
     def _can_play(self) -> bool:
         """Is the match on, and somebody there to play it?"""
@@ -380,7 +381,7 @@ class Simulator(Node):
 
     def _step(self) -> None:
         """Play the cycle, or end the episode where a reset was asked for."""
-        if self._is_told_to_end() or not self.context.ok():
+        if self._is_told_to_end():
             return
         stamp, seen = self._messages.stamp_ns(), self.world.perceptions
         for name, data in self.roster.answers():
@@ -424,9 +425,8 @@ class Simulator(Node):
         self._health.wait_for_all_acked(Duration(seconds=FAREWELL))
 
     def _is_taken_in(self) -> bool:
-        played = 0 < self.settings.episodes <= self.num_finished
         num_here = self.num_finished - self.settings.first_episode
-        return not played or all(
+        return not self._is_played() or all(
             self._statuses[player]["episodes"] >= self._first_counts[player] + num_here
             for player, seat in enumerate(self.roster.seats)
             if seat.present
@@ -470,13 +470,6 @@ def read_status(data: bytes, player: int, name: str) -> dict[str, Any] | None:
     if (status["player_index"], status["name"]) != (player, name):
         raise KeepawayError(f"the status of {status['name']!r}, player {status['player_index']}")
     return status
-
-
-def compile_world(task: Task, config: Config) -> None:
-    """Play one cycle on another field, so that the first cycle of the match is not late."""
-    world = World(task, config)
-    world.start(0, np.random.SeedSequence(0))
-    world.step(world.state.action, world.state.target)
 
 
 def main(args: list[str] | None = None) -> None:
