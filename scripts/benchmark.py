@@ -18,8 +18,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pymunk
@@ -85,7 +87,7 @@ def measure_world(args: argparse.Namespace) -> dict[str, float]:
         figures[f"learn_{task}_us"] = trainer_time(task, "learn", args.fields, args.cycles)
     for fields in (32, 256):
         figures[f"learn_3v2_{fields}_fields_us"] = trainer_time("3v2", "learn", fields, args.cycles)
-    return figures
+    return figures | phases("3v2", args.fields, args.cycles)
 
 
 def floor(num_fields: int, cycles: int, num_objects: int = 6) -> float:
@@ -120,21 +122,58 @@ def floor(num_fields: int, cycles: int, num_objects: int = 6) -> float:
 
 def trainer_time(task: str, policy: str, num_fields: int, cycles: int) -> float:
     """CPU microseconds per field-cycle of the trainer, compiled and warmed up before."""
-    from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+    from keepaway_agent.trainer import Trainer, TrainerConfig
     from keepaway_sim.task import Task
 
-    def play(cycles: int) -> tuple[float, int]:
-        trials = (
-            Trial(trial_seed(1, k), StopRule(max_cycles=cycles), policy) for k in range(num_fields)
-        )
-        start = time.process_time()
-        played = sum(int(result.durations.sum()) for result in trainer.run(trials))
-        return time.process_time() - start, played
+    trainer = Trainer(TrainerConfig(Task.parse(task)), num_fields)
+    play(trainer, policy, num_fields, 300)
+    spent, played = play(trainer, policy, num_fields, cycles)
+    return spent * 1e6 / played
+
+
+def play(trainer: Any, policy: str, num_fields: int, cycles: int) -> tuple[float, int]:
+    """CPU seconds and field-cycles of a trial on every field."""
+    from keepaway_agent.trainer import StopRule, Trial, trial_seed
+
+    trials = (
+        Trial(trial_seed(1, k), StopRule(max_cycles=cycles), policy) for k in range(num_fields)
+    )
+    start = time.process_time()
+    played = sum(int(result.durations.sum()) for result in trainer.run(trials))
+    return time.process_time() - start, played
+
+
+def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
+    """Where learning's CPU microseconds go, per field-cycle: the parts of a cycle, and the rest."""
+    from keepaway_agent.trainer import Trainer, TrainerConfig
+    from keepaway_sim.task import Task
 
     trainer = Trainer(TrainerConfig(Task.parse(task)), num_fields)
-    play(300)
-    spent, played = play(cycles)
-    return spent * 1e6 / played
+    world = trainer._world
+    spent: defaultdict[str, float] = defaultdict(float)
+
+    def watch(owner: Any, function: str, phase: str) -> None:
+        unwatched = getattr(owner, function)
+
+        def watched(*arguments: Any) -> Any:
+            start = time.process_time()
+            result = unwatched(*arguments)
+            spent[phase] += time.process_time() - start
+            return result
+
+        setattr(owner, function, watched)
+
+    watch(world, "_act", "commands")
+    watch(world._bodies, "move", "pymunk")
+    watch(world, "_settle", "perception")
+    watch(trainer, "_decide_all", "decisions")
+    watch(world._streams, "refill", "random")
+    watch(trainer._streams, "refill", "random")
+    play(trainer, "learn", num_fields, 300)
+    spent.clear()
+    whole, played = play(trainer, "learn", num_fields, cycles)
+    spent["rest"] = whole - sum(spent.values())
+    return {f"{task}_{phase}_us": time * 1e6 / played for phase, time in spent.items()}
 
 
 def measure_compile(_: argparse.Namespace) -> dict[str, float]:
