@@ -120,7 +120,7 @@ class World:
 
         Raises:
             KeepawayError: a request that its player cannot carry out, or arrays of another
-                shape; nothing was played.
+                shape or kind; nothing was played.
         """
         action, target = self._checked(action), self._checked(target)
         self._streams.refill()
@@ -134,10 +134,9 @@ class World:
 
     def _checked(self, request: np.ndarray) -> np.ndarray:
         """The requests as the compiled code takes them."""
-        if request.shape != self.state.action.shape:
-            raise KeepawayError(
-                f"requests of shape {request.shape}: give {self.state.action.shape}"
-            )
+        if request.shape != self.state.action.shape or request.dtype.kind not in "iu":
+            given, wanted = f"{request.shape} {request.dtype}", self.state.action.shape
+            raise KeepawayError(f"requests of shape {given}: give whole numbers of shape {wanted}")
         return np.ascontiguousarray(request, dtype=np.int64)
 
     def _refuse(self, illegal: int, action: np.ndarray, target: np.ndarray) -> None:
