@@ -61,13 +61,31 @@ def test_trials_that_never_reach_the_threshold_are_a_flat_line():
     assert not reached.any()
 
 
+def test_where_all_trials_have_reached_it_the_axis_ends_soon_after():
+    early = statistics.kaplan_meier([1.0, 2.0], [True, True])
+    late = statistics.kaplan_meier([1.0, 4.0], [True, False])
+    for curves, end in (({"0": early}, 2.1), ({"0": early, "10": late}, 60.0)):
+        (axes,) = plotting.share_reached(curves, limit=60.0, title="4v3").axes
+        assert axes.get_xlim() == pytest.approx((0, end))
+
+
+def test_only_rows_with_an_order_are_connected():
+    times = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
+    for connected, style in ((True, "-"), (False, "None")):
+        figure = plotting.time_to_threshold(
+            ["a", "b"], times, times, times[0], title="4v3", rows_are="Way", connected=connected
+        )
+        (axes,) = figure.axes
+        assert {line.get_linestyle() for line in axes.lines if line.get_marker() == "o"} == {style}
+
+
 def test_the_distribution_of_durations_falls_by_one_episode_a_step():
-    ((times, going_on),) = lines(plotting.durations({"first": [4.0, 2.0]}, title="4v3"))
-    assert times.tolist() == [0, 2, 4]
-    assert going_on.tolist() == [1, 0.5, 0]
+    first, last = lines(plotting.durations({"scratch": ([4.0, 2.0], [6.0])}, title="4v3"))
+    assert [axis.tolist() for axis in first] == [[0, 2, 4], [1, 0.5, 0]]
+    assert [axis.tolist() for axis in last] == [[0, 6], [1, 0]]
 
 
 def test_more_lines_than_the_palette_has_still_differ_in_colour():
-    groups = {str(row): [float(row + 1)] for row in range(10)}
+    groups = {str(row): ([float(row + 1)], [2.0]) for row in range(10)}
     (axes,) = plotting.durations(groups, title="4v3").axes
     assert len({line.get_color() for line in axes.lines}) == 10

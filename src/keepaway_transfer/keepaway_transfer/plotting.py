@@ -69,6 +69,7 @@ def time_to_threshold(
     *,
     title: str,
     rows_are: str,
+    connected: bool = True,
 ) -> Figure:
     """Hours to the threshold, row by row.
 
@@ -79,6 +80,7 @@ def time_to_threshold(
         scratch: hours of learning from scratch, a band across.
         title: above the axes.
         rows_are: what the rows differ in, below the axes.
+        connected: by lines, as rows are whose order means something.
     """
     figure, axes = _figure(title, rows_are, "Simulated hours to threshold")
     axes.axhspan(scratch.low, scratch.high, color=COLOURS[0], alpha=BAND, linewidth=0)
@@ -92,6 +94,7 @@ def time_to_threshold(
         axes.errorbar(
             places + shift, estimate, [estimate - low, high - estimate], color=colour,
             marker="o", markersize=5, capsize=3, linewidth=1.2, label=label,
+            linestyle="-" if connected else "none",
         )  # fmt: skip
     axes.set_xticks(places, rows)
     axes.set_ylim(bottom=0)
@@ -107,22 +110,31 @@ def share_reached(curves: Mapping[str, SurvivalCurve], limit: float, title: str)
         share = np.concatenate([[1.0], curve.share])
         reached = 1 - np.append(share, share[-1])
         axes.step(times, reached, where="post", color=colour, linewidth=1.5, label=label)
+    if all(curve.share.size and curve.share[-1] == 0 for curve in curves.values()):
+        limit = min(limit, 1.05 * max(curve.times[-1] for curve in curves.values()))
     axes.set_xlim(0, limit)
     axes.set_ylim(0, 1.02)
     axes.legend(frameon=False, fontsize=8, loc="upper left")
     return figure
 
 
-def durations(groups: Mapping[str, ArrayLike], title: str) -> Figure:
-    """Distribution of episode durations [s]: the share of episodes still going on."""
+def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
+    """Distribution of episode durations: the share of episodes still going on.
+
+    Args:
+        groups: label -> durations [s] of first episodes (dotted) and of last ones.
+        title: above the axes.
+    """
     figure, axes = _figure(title, "Time since kick-off (s)", "Share of episodes still going on")
-    for (label, values), colour in zip(groups.items(), _colours(len(groups)), strict=True):
-        ordered = np.sort(np.asarray(values, dtype=np.float64))
-        going_on = 1 - np.arange(1, len(ordered) + 1) / len(ordered)
-        axes.step(
-            np.concatenate([[0.0], ordered]), np.concatenate([[1.0], going_on]), where="post",
-            color=colour, linewidth=1.5, label=f"{label} (mean {ordered.mean():.1f} s)",
-        )  # fmt: skip
+    for (label, (first, last)), colour in zip(groups.items(), _colours(len(groups)), strict=True):
+        starts, ends = (np.sort(np.asarray(one, dtype=np.float64)) for one in (first, last))
+        label = f"{label} (mean {starts.mean():.1f} s, then {ends.mean():.1f} s)"
+        for ordered, style, name in ((starts, ":", None), (ends, "-", label)):
+            going_on = 1 - np.arange(1, len(ordered) + 1) / len(ordered)
+            axes.step(
+                np.concatenate([[0.0], ordered]), np.concatenate([[1.0], going_on]), style,
+                where="post", color=colour, linewidth=1.5, label=name,
+            )  # fmt: skip
     axes.set_xlim(left=0)
     axes.set_ylim(0, 1.02)
     axes.legend(frameon=False)

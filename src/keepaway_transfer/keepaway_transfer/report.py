@@ -190,19 +190,20 @@ def _figures(
             [row.total for row in rows],
             scratch,
             title=goal,
-            rows_are=_rows_are(study),
+            rows_are=_amount_of(study) or "Way of transfer",
+            connected=bool(_amount_of(study)),
         ),
         "share_reached": plotting.share_reached(reached, study.max_hours, goal),
         "durations": plotting.durations(
             {
-                f"{labels[name]}: {part}": _pooled(trials[name], episodes)
-                for name in drawn
-                for part, episodes in (
-                    ("start", slice(0, metrics.FIRST_EPISODES)),
-                    ("end", slice(-metrics.FIRST_EPISODES, None)),
+                labels[name]: (
+                    _pooled(trials[name], slice(0, metrics.FIRST_EPISODES)),
+                    _pooled(trials[name], slice(-metrics.FIRST_EPISODES, None)),
                 )
+                for name in drawn
             },
-            f"Episodes of {study.target}: first and last {metrics.FIRST_EPISODES} of each trial",
+            f"Episodes of {study.target}: first (dotted) and last {metrics.FIRST_EPISODES} of each"
+            " trial",
         ),
     }
 
@@ -214,11 +215,14 @@ def _label(row: Row) -> str:
     return f"after {before}" + (f" ({row.variant})" if row.variant != "rho" else "")
 
 
-def _rows_are(study: Study) -> str:
-    chains = {tuple(stage.task for stage in row.stages) for row in study.rows if row.stages}
-    if len(chains) == 1 and len({row.source_episodes for row in study.rows}) > 2:
-        return f"Episodes of {next(iter(chains))[0]} before transfer"
-    return "Way of transfer"
+def _amount_of(study: Study) -> str:
+    """What the rows have more and more of, in words; empty if they differ otherwise."""
+    ways = {
+        (row.variant, *(stage.task for stage in row.stages)) for row in study.rows if row.stages
+    }
+    if len(ways) == 1 and len({row.source_episodes for row in study.rows}) > 2:
+        return f"Episodes of {next(iter(ways))[1]} before transfer"
+    return ""
 
 
 def _hours_run(trials: dict[str, list[Trial]]) -> list[float]:
