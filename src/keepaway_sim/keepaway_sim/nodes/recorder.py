@@ -29,6 +29,7 @@ from keepaway_sim.messages import (
     ACTION_REQUEST,
     AGENT_STATUS,
     CLOCK,
+    CYCLE_NS,
     EPISODE,
     FIELD_STATE,
     MARKERS,
@@ -46,6 +47,7 @@ POLL_PERIOD = 0.005  # [s]
 FLUSH_PERIOD = 1.0  # [s]
 QUIET = 0.3  # [s] nothing came for so long: all that was said has come
 LONGEST_FAREWELL = 5.0  # [s] a match that goes on is left after so long
+REPORT_STEP = 10 * CYCLE_NS  # whoever waits for it lets it be further behind than that
 REMEMBERED_CYCLES = 100  # whose time is known when a request answers them
 SAID_BY_THE_MATCH = {
     "/clock": CLOCK,
@@ -132,7 +134,7 @@ class Recorder(Node):
                 self._record(topic, message_type, data)
                 count += 1
         if self._is_listening_to_players():
-            self._report(max(0, self.gaps.complete_until()))
+            self._report(max(0, self.gaps.complete_until()), is_behind=count > 0)
         if time.monotonic() - self._flushed > FLUSH_PERIOD:
             self.bag.flush()
             self._flushed = time.monotonic()
@@ -187,8 +189,10 @@ class Recorder(Node):
             self._reported >= 0 or all(self.count_publishers(topic) for topic in topics)
         )
 
-    def _report(self, time_ns: int) -> None:
-        if time_ns != self._reported:
+    def _report(self, time_ns: int, is_behind: bool) -> None:
+        """Say what has been reached: all of it, or while more is coming a step ahead."""
+        step = REPORT_STEP if is_behind and self._reported >= 0 else 1
+        if not 0 <= time_ns - self._reported < step:  # time may begin anew
             self._reported = time_ns
             self._recorded.publish(Time(**stamp(time_ns)))
 
