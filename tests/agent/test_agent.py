@@ -55,18 +55,27 @@ def test_a_view_may_be_made_of_any_kinds_of_arrays():
     plain, other = learner(), learner()
     for cycle in range(20):
         usual = perceived(cycle=cycle)
-        wide = np.empty((6, 4))
-        wide[:, ::2] = usual.view.position
-        unusual = View(
-            wide[:, ::2],
-            usual.view.age.astype(np.int64),
-            usual.view.cycles_to_ball[::-1],
-            True,
-            cycle,
-        )
-        answer = other.perceive(usual._replace(view=unusual))
+        answer = other.perceive(usual._replace(view=spread(usual.view)))
         assert answer[:2] == plain.perceive(usual)[:2]
     assert same_weights(plain, other)
+    fastest = perceived(cycle=30, kickable=False).view._replace(
+        cycles_to_ball=np.array([3, 9, 9, 9, 9], dtype=np.int32)
+    )
+    answer = other.perceive(Perceived(0, Outcome.IN_PLAY, True, spread(fastest)))
+    assert answer.action == Action.GO_TO_BALL
+    ages = np.array([0, 0, 0, 13, 0, 0], dtype=np.int32)
+    somebody_lost = perceived(cycle=31).view._replace(age=ages)
+    answer = other.perceive(Perceived(0, Outcome.IN_PLAY, True, spread(somebody_lost)))
+    assert not answer.values.size  # so no learner was asked
+
+
+def spread(view):
+    """The same view in wider numbers, with others between them in memory."""
+    position = np.ones((6, 4))
+    position[:, ::2] = view.position
+    age, cycles = np.zeros(12, dtype=np.int64), np.ones(10, dtype=np.int32)
+    age[::2], cycles[::2] = view.age, view.cycles_to_ball
+    return view._replace(position=position[:, ::2], age=age[::2], cycles_to_ball=cycles[::2])
 
 
 def test_a_perception_from_the_past_is_not_answered():
