@@ -14,14 +14,14 @@ import signal
 import sys
 from pathlib import Path
 
-from keepaway_sim.analysis import analyse
+from keepaway_sim.analysis.tally import analyse
+from keepaway_sim.bags.writer import is_bag
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.recording import is_bag
-from keepaway_transfer import metrics
 from keepaway_transfer.errors import TransferError
-from keepaway_transfer.kwy import read_kwy
-from keepaway_transfer.report import write_report
-from keepaway_transfer.results import read_results
+from keepaway_transfer.reports import metrics
+from keepaway_transfer.reports.kwy import read_kwy
+from keepaway_transfer.reports.report import write_report
+from keepaway_transfer.studies.results import read_results
 
 
 def main() -> int:

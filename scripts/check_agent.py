@@ -17,11 +17,11 @@ import sys
 import rclpy
 from rclpy.experimental import EventsExecutor
 
-from keepaway_agent.conformance import answer_times, judge, report, script
+from keepaway_agent.checks.conformance import answer_times, judge, report, script
 from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.scripted_simulator import ScriptedSimulator
-from keepaway_sim.options import ros_arguments
-from keepaway_sim.processes import Processes, script_command
+from keepaway_sim.cli.options import ros_arguments
+from keepaway_sim.cli.processes import Processes, script_command
 
 AGENT = "agent"
 

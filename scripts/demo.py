@@ -28,13 +28,20 @@ from typing import Any
 
 import numpy as np
 
-from keepaway_agent.trainer import Progress, StopRule, Trainer, TrainerConfig, Trial, trial_seed
-from keepaway_agent.weights import load_weights, save_weights
+from keepaway_agent.learning.weights import load_weights, save_weights
+from keepaway_agent.training.trainer import (
+    Progress,
+    StopRule,
+    Trainer,
+    TrainerConfig,
+    Trial,
+    trial_seed,
+)
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
-from keepaway_transfer import metrics, plotting
+from keepaway_transfer.reports import metrics, plotting
+from keepaway_transfer.reports.statistics import mean_curve
 from keepaway_transfer.rho import Transfer, transferred
-from keepaway_transfer.statistics import mean_curve
 
 SCRIPTS = Path(__file__).resolve().parent
 DOMAIN = 97  # the demo's own, unless one is set: it hears no other match

@@ -14,9 +14,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from keepaway_agent.describe import describe, draw_preferences, draw_values, save
 from keepaway_agent.errors import AgentError
-from keepaway_agent.weights import load_weights, to_metadata
+from keepaway_agent.learning.describe import describe, draw_preferences, draw_values, save
+from keepaway_agent.learning.weights import load_weights, to_metadata
 
 
 def main() -> int:

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.nodes.raw import message_class
+from keepaway_sim.ros.subscribing import message_class
 
 HIDDEN = ("/parameter_events", "/rosout")
 OWN_SERVICES = ("rcl_interfaces/", "type_description_interfaces/")  # every node has these

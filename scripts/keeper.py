@@ -9,10 +9,10 @@ name is the player's: the match of a task has keeper_1, keeper_2 and so on.
 import argparse
 import sys
 
-from keepaway_agent.agent import AgentConfig
 from keepaway_agent.nodes.keeper import main
 from keepaway_agent.nodes.player import Files
-from keepaway_sim.options import add_options, parse_node_arguments
+from keepaway_agent.playing.agent import AgentConfig
+from keepaway_sim.cli.options import add_options, parse_node_arguments
 
 
 def parser() -> argparse.ArgumentParser:

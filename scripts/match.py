@@ -29,12 +29,12 @@ from rclpy.signals import SignalHandlerOptions
 from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.player import Player
-from keepaway_agent.policies import KEEPER_POLICIES, TAKER_POLICIES
+from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
+from keepaway_sim.cli.options import ros_arguments
+from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
-from keepaway_sim.options import ros_arguments
-from keepaway_sim.processes import Processes, script_command
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 

@@ -11,8 +11,8 @@ scripts/match.py --record.) What follows --ros-args goes to the node.
 import argparse
 import sys
 
+from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.nodes.recorder import Settings, main
-from keepaway_sim.options import add_options, parse_node_arguments
 
 
 def parser() -> argparse.ArgumentParser:

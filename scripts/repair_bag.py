@@ -10,9 +10,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from keepaway_sim.bags.gaps import count_gaps
+from keepaway_sim.bags.writer import BagReader, repair
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.gaps import count_gaps
-from keepaway_sim.recording import BagReader, repair
 
 
 def main() -> int:

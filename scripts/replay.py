@@ -26,15 +26,15 @@ from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 
-from keepaway_agent.checking import check_decisions
+from keepaway_agent.checks.decisions import check_decisions
 from keepaway_agent.errors import AgentError
-from keepaway_sim.checking import check_world
-from keepaway_sim.episodes import MatchBag
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.playback import Playback
+from keepaway_sim.bags.verify import check_world
+from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.messages import SECOND
 from keepaway_sim.nodes.replayer import Replayer, Settings
-from keepaway_sim.options import add_options, parse_node_arguments
-from keepaway_sim.playback import Playback
+from keepaway_sim.wire.messages import SECOND
 
 
 def main() -> int:

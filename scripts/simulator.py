@@ -10,9 +10,9 @@ goes to the node as it is.
 import argparse
 import sys
 
-from keepaway_sim.config import Physics, Skills, Vision
+from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.nodes.simulator import Settings, main
-from keepaway_sim.options import add_options, parse_node_arguments
+from keepaway_sim.world.config import Physics, Skills, Vision
 
 
 def parser() -> argparse.ArgumentParser:

@@ -23,13 +23,13 @@ from pathlib import Path
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
-from keepaway_agent.training import end_with_parent
+from keepaway_agent.training.training import end_with_parent
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
-from keepaway_transfer.batch import play
-from keepaway_transfer.experiment import Progress, run
-from keepaway_transfer.results import open_results
-from keepaway_transfer.study import Study, load_study
+from keepaway_transfer.studies.batch import play
+from keepaway_transfer.studies.experiment import Progress, run
+from keepaway_transfer.studies.results import open_results
+from keepaway_transfer.studies.study import Study, load_study
 
 log = logging.getLogger("study")
 

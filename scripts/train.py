@@ -27,15 +27,21 @@ import numpy as np
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
-from keepaway_agent.trainer import Progress
-from keepaway_agent.training import NUM_FIELDS, RECORDED_TRIAL, Training, TrainingFolder, play
-from keepaway_agent.trial_recorder import TrialRecorder
-from keepaway_agent.weights import HOURS_PER_CYCLE
-from keepaway_sim.config import CYCLE_TIME
+from keepaway_agent.learning.weights import HOURS_PER_CYCLE
+from keepaway_agent.training.trainer import Progress
+from keepaway_agent.training.training import (
+    NUM_FIELDS,
+    RECORDED_TRIAL,
+    Training,
+    TrainingFolder,
+    play,
+)
+from keepaway_agent.training.trial_recorder import TrialRecorder
+from keepaway_sim.cli.options import add_options, numbers_in
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.options import add_options, numbers_in
-from keepaway_sim.scores import Score, summary
+from keepaway_sim.match.scores import Score, summary
 from keepaway_sim.task import Outcome
+from keepaway_sim.world.config import CYCLE_TIME
 
 LAST = 1000
 """Episodes at the end of a trial whose mean says how good it has become."""

@@ -15,9 +15,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from keepaway_agent.cmac import WIDTH_PROFILES
 from keepaway_agent.errors import AgentError
-from keepaway_agent.weights import load_weights, save_weights
+from keepaway_agent.learning.cmac import WIDTH_PROFILES
+from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import load_mapping

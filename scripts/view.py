@@ -19,12 +19,12 @@ from pathlib import Path
 
 import rclpy
 
-from keepaway_sim.episodes import MatchBag, with_markers
+from keepaway_sim.bags.match_bag import MatchBag, with_markers
+from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.live import Server
 from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
-from keepaway_sim.options import numbers_in
-from keepaway_sim.viewer import picture, replay_page
+from keepaway_sim.view.live import Server
+from keepaway_sim.view.page import picture, replay_page
 
 LAYOUT = Path(__file__).resolve().parents[1] / "src/keepaway_sim/foxglove/keepaway.json"
 

@@ -4,9 +4,13 @@ import resource
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import domain_coordinator
 import pytest
+
+if TYPE_CHECKING:
+    from graph import Graph
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -15,9 +19,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests under tests/ros on one worker: two ROS graphs at once would both be late."""
+    """Keep the tests that run nodes on one worker: two ROS graphs at once would both be late."""
     for item in items:
-        if item.path.is_relative_to(ROOT / "tests" / "ros"):
+        if {"ros", "nodes"} & set(item.path.relative_to(ROOT).parts[1:-1]):
             item.add_marker(pytest.mark.xdist_group("ros"))
 
 
@@ -42,3 +46,13 @@ def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield domain
+
+
+@pytest.fixture
+def graph(ros_domain: int) -> "Iterator[Graph]":
+    """An empty ROS graph of the test's own."""
+    from graph import Graph  # only tests that use nodes wait for rclpy
+
+    made = Graph(ros_domain)
+    yield made
+    made.close()

@@ -11,14 +11,21 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from keepaway_agent.actions import Role
-from keepaway_agent.agent import Agent, AgentConfig, MatchFacts
+from keepaway_agent.learning.weights import LearnedWeights
 from keepaway_agent.nodes.player import Player
-from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, TrialResult, trial_seed
-from keepaway_agent.weights import LearnedWeights
+from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts
+from keepaway_agent.training.trainer import (
+    StopRule,
+    Trainer,
+    TrainerConfig,
+    Trial,
+    TrialResult,
+    trial_seed,
+)
 from keepaway_msgs.msg import Episode
+from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.simulator import Simulator
-from keepaway_sim.nodes.voice import ALL
-from keepaway_sim.options import ros_arguments
+from keepaway_sim.ros.publishing import ALL
 from keepaway_sim.task import Task
 
 PATIENCE = 60.0  # [s] for anything to happen

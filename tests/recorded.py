@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from keepaway_agent.agent import Agent, AgentConfig, MatchFacts, Perceived
-from keepaway_agent.policies import View
-from keepaway_sim.config import CYCLE_TIME, Config, profile
-from keepaway_sim.episodes import FieldRecorder, world_info
-from keepaway_sim.recording import BagWriter
+from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived
+from keepaway_agent.playing.policies import View
+from keepaway_sim.bags.match_bag import FieldRecorder, world_info
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.task import Action, Outcome, Task
-from keepaway_sim.vision import Perceptions
-from keepaway_sim.world import World
+from keepaway_sim.world.config import CYCLE_TIME, Config, profile
+from keepaway_sim.world.sight import Perceptions
+from keepaway_sim.world.world import World
 
 
 def record_match(path: Path, task: str, seed: int, episodes: int) -> Path:

@@ -8,10 +8,11 @@ import math
 
 import numpy as np
 
-from keepaway_sim import skills, vision
-from keepaway_sim.config import NEVER, Config, noiseless, pack, profile
-from keepaway_sim.intercept import cycles_to_ball
 from keepaway_sim.task import Task
+from keepaway_sim.world import sight
+from keepaway_sim.world.config import NEVER, Config, noiseless, pack, profile
+from keepaway_sim.world.skills import tactics
+from keepaway_sim.world.skills.prediction import cycles_to_ball
 
 EXACT = noiseless(profile("2005"))  # every noise and rounding off
 
@@ -41,9 +42,9 @@ class Scene:
         takers = max([1, *(ord(name) - 96 for name in places if name in "abcdefghijk")])
         self.c = pack(Task(keepers, takers, field, field), config)
         self.num_keepers, self.ball = keepers, keepers + takers
-        self.s = vision.make_perceptions(1, self.ball)
-        self.m = vision.make_memory(self.c, 1)
-        self.speech = vision.make_speech(1, self.ball)
+        self.s = sight.make_perceptions(1, self.ball)
+        self.m = sight.make_memory(self.c, 1)
+        self.speech = sight.make_speech(1, self.ball)
         self.position = np.tile([-5.0, -12.0], (self.ball + 1, 1))
         self.velocity = np.zeros((self.ball + 1, 2))
         self.yaw = np.zeros(self.ball)
@@ -105,21 +106,21 @@ class Scene:
     def command(self, name: str, action: int, target: str = "1") -> tuple[float, float, float]:
         """A player's command: kind, power, angle [deg]."""
         p, aim = self.index(name), self.index(target)
-        kind, power, angle = skills.command(self.c, self.s, self.m, 0, p, int(action), aim)
+        kind, power, angle = tactics.command(self.c, self.s, self.m, 0, p, int(action), aim)
         return kind, power, math.degrees(angle)
 
     def ball_after(self, name: str, command: tuple[float, float, float]) -> np.ndarray:
         """Where the ball is a cycle after a player's command (kind, power, degrees)."""
         kind, power, angle = command
         p = self.index(name)
-        return np.array(skills.ball_after(self.c, self.s, 0, p, kind, power, math.radians(angle)))
+        return np.array(tactics.ball_after(self.c, self.s, 0, p, kind, power, math.radians(angle)))
 
     def look(self, name: str, *uniforms: float) -> None:
         """Let a player see the truth; `uniforms` are the random numbers that it takes."""
         block = np.array([[*uniforms, *[math.nan] * 64]])
         cursor = np.zeros(1, dtype=np.int64)
         truth = self.position, self.velocity, self.yaw
-        vision.look(self.c, self.s, self.m, *truth, 0, self.index(name), block, cursor)
+        sight.look(self.c, self.s, self.m, *truth, 0, self.index(name), block, cursor)
         assert cursor[0] == len(uniforms)
 
     def seen(self, name: str, what: str) -> np.ndarray:

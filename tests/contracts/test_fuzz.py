@@ -1,4 +1,4 @@
-"""Whatever others wrote is taken as valid or refused: a short run of scripts/fuzz.py."""
+"""Whatever others wrote is taken as valid or refused: a short run of scripts/checks/fuzz.py."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "fuzz.py"
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "checks" / "fuzz.py"
 
 
 def test_broken_input_is_refused_and_breaks_nothing(tmp_path: Path) -> None:
@@ -23,5 +23,5 @@ def test_broken_input_is_refused_and_breaks_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("words", ["pickle.load", "eval(", "exec(", "shell=True", "os.system"])
 def test_nothing_that_is_shipped_runs_what_it_reads(words: str) -> None:
     root = SCRIPT.parents[1]
-    files = [*root.glob("src/*/keepaway_*/**/*.py"), *root.glob("scripts/*.py")]
+    files = [*root.glob("src/*/keepaway_*/**/*.py"), *root.glob("scripts/**/*.py")]
     assert not [path.name for path in files if words in path.read_text()]

@@ -18,15 +18,15 @@ from rosbags.highlevel import AnyReader
 from keepaway_agent.actions import Role
 from keepaway_agent.nodes.player import Player
 from keepaway_msgs.msg import ActionRequest
-from keepaway_sim.episodes import MatchBag
-from keepaway_sim.gaps import count_gaps
-from keepaway_sim.live import Server
-from keepaway_sim.messages import clean_request
+from keepaway_sim.bags.gaps import count_gaps
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer
 from keepaway_sim.nodes.spectator import Spectator
-from keepaway_sim.options import ros_arguments
-from keepaway_sim.recording import BagReader
+from keepaway_sim.view.live import Server
+from keepaway_sim.wire.messages import clean_request
 
 ROOT = Path(__file__).resolve().parents[2]
 START_TIMEOUT = 60.0  # [s]

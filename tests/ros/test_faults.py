@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from graph import Graph, played, trained
 
-from keepaway_agent.weights import load_weights
+from keepaway_agent.learning.weights import load_weights
+from keepaway_sim.bags.writer import repair
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.recording import repair
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENT = {"answer_timeout": 20.0}
@@ -30,7 +30,7 @@ def test_faults_at_random_moments_lose_nothing(ros_domain: int) -> None:
         str(ros_domain),
         "--json",
     ]
-    command = [sys.executable, str(ROOT / "scripts" / "faults.py"), *options]
+    command = [sys.executable, str(ROOT / "scripts" / "checks" / "faults.py"), *options]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout.splitlines()[-1])

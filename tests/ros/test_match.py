@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from graph import Played, played, trained
 
-from keepaway_agent.weights import load_weights
-from keepaway_sim.recording import BagReader
+from keepaway_agent.learning.weights import load_weights
+from keepaway_sim.bags.writer import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
 KEEPERS = ("keeper_1", "keeper_2", "keeper_3")

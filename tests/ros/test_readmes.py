@@ -13,16 +13,16 @@ from recorded import record_match
 
 from keepaway_agent.actions import Role
 from keepaway_agent.nodes.player import Player
-from keepaway_sim.config import Config
-from keepaway_sim.live import LiveMatch
+from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.nodes.spectator import Spectator
-from keepaway_sim.options import ros_arguments
-from keepaway_sim.recording import BagReader
 from keepaway_sim.task import Task
+from keepaway_sim.view.live import LiveMatch
+from keepaway_sim.world.config import Config
 from keepaway_transfer.nodes.transfer import Transfer
 
 SRC = Path(__file__).resolve().parents[2] / "src"

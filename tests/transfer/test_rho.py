@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keepaway_agent.actions import Role
-from keepaway_agent.cmac import Tiling, action_values, make_tiling, state_cells
-from keepaway_agent.sarsa import SarsaConfig
-from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
+from keepaway_agent.learning.cmac import Tiling, action_values, make_tiling, state_cells
+from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import (

@@ -16,8 +16,8 @@ import matplotlib as mpl
 import numpy as np
 from small_network import QNetworks
 
-from keepaway_agent.environments import KeeperVectorEnv
-from keepaway_agent.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_agent.environments.gym import KeeperVectorEnv
+from keepaway_agent.training.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
 
 CYCLES_PER_HOUR = 36_000

@@ -29,8 +29,8 @@ def drop_stale_cache(package: Path) -> None:
     which an older version of another file was compiled. (Several processes may do this at once.
     The nodes below the package compile nothing.)
     """
-    newest = max(source.stat().st_mtime_ns for source in package.glob("*.py"))
-    for cached in package.glob("__pycache__/*.nb[ic]"):
+    newest = max(source.stat().st_mtime_ns for source in package.rglob("*.py"))
+    for cached in package.rglob("__pycache__/*.nb[ic]"):
         with contextlib.suppress(FileNotFoundError):
             if cached.stat().st_mtime_ns < newest:
                 cached.unlink()

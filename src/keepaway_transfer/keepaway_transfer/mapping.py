@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from keepaway_agent.actions import Role, keeper_action_names
-from keepaway_agent.features import feature_names
+from keepaway_agent.learning.features import feature_names
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keepaway_agent.actions import Role
-from keepaway_agent.cmac import NUM_TILINGS, WIDTH_PROFILES, Tiling, make_tiling
-from keepaway_agent.weights import LearnedWeights
+from keepaway_agent.learning.cmac import NUM_TILINGS, WIDTH_PROFILES, Tiling, make_tiling
+from keepaway_agent.learning.weights import LearnedWeights
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import MappingError

@@ -13,9 +13,9 @@ import struct
 import numpy as np
 
 from keepaway_agent.actions import Outcome
-from keepaway_agent.agent import Decision, MatchFacts, Perceived
 from keepaway_agent.errors import AgentError
-from keepaway_agent.policies import View
+from keepaway_agent.playing.agent import Decision, MatchFacts, Perceived
+from keepaway_agent.playing.policies import View
 from keepaway_msgs.msg import Match
 
 HEADER = b"\x00\x01\x00\x00"

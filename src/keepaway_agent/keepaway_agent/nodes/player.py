@@ -22,10 +22,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.agent import Agent, AgentConfig, Perceived, check_config
 from keepaway_agent.errors import AgentError, WeightsError
+from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
-from keepaway_agent.weights import LearnedWeights, load_weights, save_weights
+from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, check_config
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 

@@ -13,8 +13,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 
-from keepaway_agent import conformance
-from keepaway_agent.conformance import Exchange, Garbage, Pause, Request, Shown, Step
+from keepaway_agent.checks import conformance
+from keepaway_agent.checks.conformance import Exchange, Garbage, Pause, Request, Shown, Step
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 
 QUEUE = QoSProfile(depth=200)

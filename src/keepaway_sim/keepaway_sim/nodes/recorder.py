@@ -22,10 +22,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
-from keepaway_sim.cdr import codec
+from keepaway_sim.bags.gaps import GapCounter
+from keepaway_sim.bags.writer import BagWriter, default_qos
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.gaps import GapCounter
-from keepaway_sim.messages import (
+from keepaway_sim.ros.subscribing import declared, listen, offered_qos, take_all, to_profile
+from keepaway_sim.version import code_version
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.wire.messages import (
     ACTION_REQUEST,
     AGENT_STATUS,
     CLOCK,
@@ -39,9 +42,6 @@ from keepaway_sim.messages import (
     stamp,
     stamp_of,
 )
-from keepaway_sim.nodes.raw import declared, listen, offered_qos, take_all, to_profile
-from keepaway_sim.recording import BagWriter, default_qos
-from keepaway_sim.version import code_version
 
 POLL_PERIOD = 0.005  # [s]
 FLUSH_PERIOD = 1.0  # [s]

@@ -21,11 +21,11 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
+from keepaway_sim.bags.playback import Playback, episode_times
+from keepaway_sim.bags.writer import BagReader, Recorded
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.messages import SECOND
-from keepaway_sim.nodes.raw import declared, message_class, to_profile
-from keepaway_sim.playback import Playback, episode_times
-from keepaway_sim.recording import BagReader, Recorded
+from keepaway_sim.ros.subscribing import declared, message_class, to_profile
+from keepaway_sim.wire.messages import SECOND
 
 HISTORY = 2000
 """Messages kept for slow listeners: a replay as fast as possible overtakes everybody."""

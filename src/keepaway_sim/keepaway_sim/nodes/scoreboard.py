@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from keepaway_msgs.msg import Episode
-from keepaway_sim.nodes.voice import ALL, QUEUE
-from keepaway_sim.scores import Score, summary
+from keepaway_sim.match.scores import Score, summary
+from keepaway_sim.ros.publishing import ALL, QUEUE
 from keepaway_sim.task import Outcome
 
 TERMINAL_PERIOD, FILE_PERIOD = 0.5, 10.0

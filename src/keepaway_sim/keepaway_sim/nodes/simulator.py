@@ -32,20 +32,20 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from keepaway_msgs.msg import ActionRequest, AgentStatus
-from keepaway_sim import messages
-from keepaway_sim.cdr import codec
-from keepaway_sim.config import CYCLE_TIME, PROFILES, Config, profile
-from keepaway_sim.episodes import begin_match, world_info
+from keepaway_sim.bags.match_bag import begin_match, world_info
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.messages import FieldMessages
-from keepaway_sim.nodes.health import diagnostics
-from keepaway_sim.nodes.inbox import PROCESS_SIZE, Inbox
-from keepaway_sim.nodes.raw import declared
-from keepaway_sim.nodes.voice import ALL, LATCHED, QUEUE, Voice
-from keepaway_sim.recording import BagWriter
-from keepaway_sim.roster import Roster
+from keepaway_sim.match.roster import Roster
+from keepaway_sim.ros.diagnostics import diagnostics
+from keepaway_sim.ros.inbox import PROCESS_SIZE, Inbox
+from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE, Voice
+from keepaway_sim.ros.subscribing import declared
 from keepaway_sim.task import Outcome, Task
-from keepaway_sim.world import World
+from keepaway_sim.wire import messages
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.wire.messages import FieldMessages
+from keepaway_sim.world.config import CYCLE_TIME, PROFILES, Config, profile
+from keepaway_sim.world.world import World
 
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more

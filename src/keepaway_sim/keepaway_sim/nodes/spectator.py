@@ -6,11 +6,11 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from keepaway_sim.bags.writer import Qos
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.live import LiveMatch
-from keepaway_sim.messages import ACTION_REQUEST, EPISODE, FIELD_STATE, MATCH, PERCEPTION
-from keepaway_sim.nodes.raw import listen, take_all, to_profile
-from keepaway_sim.recording import Qos
+from keepaway_sim.ros.subscribing import listen, take_all, to_profile
+from keepaway_sim.view.live import LiveMatch
+from keepaway_sim.wire.messages import ACTION_REQUEST, EPISODE, FIELD_STATE, MATCH, PERCEPTION
 
 POLL_PERIOD = 0.02  # [s]
 EVERY_CYCLE = Qos(100)  # what is not taken in time is missed

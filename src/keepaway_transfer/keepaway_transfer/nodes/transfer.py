@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.errors import AgentError
-from keepaway_agent.weights import load_weights, save_weights
+from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_msgs.srv import ApplyRho
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.mapping import load_mapping

@@ -1,0 +1,241 @@
+"""Is the world the real one? Hold times, their causes and learning, beside the real server's.
+
+The reference was measured on the RoboCup soccer server 19.0.0 with UT Austin's keepaway players
+(`keepaway_sim/reference/`): its profile E05 is `2005` here, D19 is `v19`. `Cell` is one of its
+measurements, `measure` plays it, `record` keeps true positions for
+`keepaway_agent.fidelity.trajectories.process_statistics`, `learn` trains keepers from scratch.
+"""
+
+from __future__ import annotations
+
+import importlib.resources
+import json
+import math
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from keepaway_agent.actions import Outcome
+from keepaway_agent.fidelity.trajectories import Trajectories, process_statistics
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.training import Training, play
+from keepaway_sim.task import Task
+from keepaway_sim.world.config import CYCLE_TIME
+from keepaway_sim.world.sight import DASH, KICK, TURN
+from keepaway_sim.world.world import World
+
+PROFILES: Final = {"2005": "E05", "v19": "D19"}
+"""Our profiles, and their names in the reference."""
+POLICIES: Final = ("random", "hold", "hand")
+TASKS: Final = ("3v2", "4v3")
+GOALS: Final = {"random": 0.10, "hold": 0.10, "hand": 0.25}
+"""How far our mean may be off at 360 degrees."""
+GOAL_NARROW: Final = 0.20  # the same at 90 degrees
+GOAL_OUT: Final = 0.10  # how far the share of episodes that end out of bounds may be off
+BLOCK: Final = 200  # episodes of which a learning curve's point is the mean
+SEED: Final = 1
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One measurement of the reference, in seconds."""
+
+    profile: str
+    visible_angle: int  # [deg]
+    task: str
+    policy: str
+    mean: float
+    sem: float
+    std: float | None = None
+    out: float | None = None  # share that ended out of bounds
+    n: int | None = None  # episodes
+
+    @property
+    def goal(self) -> float:
+        """The share by which our mean may be off."""
+        return GOALS[self.policy] if self.visible_angle == 360 else GOAL_NARROW
+
+
+class Ratio(NamedTuple):
+    """Our mean over the reference's, with its 95 % interval."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+class Measured(NamedTuple):
+    """What a cell gave here."""
+
+    cell: Cell
+    duration: np.ndarray  # (num_episodes,) [s]
+    out: float  # share that ended out of bounds
+
+    @property
+    def mean(self) -> float:
+        """Mean duration [s]."""
+        return float(self.duration.mean())
+
+    @property
+    def std(self) -> float:
+        """Standard deviation over episodes [s]."""
+        return float(self.duration.std(ddof=1))
+
+    @property
+    def sem(self) -> float:
+        """Standard error of the mean [s]."""
+        return self.std / math.sqrt(len(self.duration))
+
+    @property
+    def ratio(self) -> Ratio:
+        """Ours over the reference; the interval takes both means as normal on a log scale."""
+        estimate = self.mean / self.cell.mean
+        spread = 1.96 * math.hypot(self.sem / self.mean, self.cell.sem / self.cell.mean)
+        return Ratio(estimate, estimate * math.exp(-spread), estimate * math.exp(spread))
+
+    @property
+    def reached(self) -> bool:
+        """Are mean and share out of bounds as near as they should be?"""
+        near = abs(self.ratio.estimate - 1.0) <= self.cell.goal
+        return near and (self.cell.out is None or abs(self.out - self.cell.out) <= GOAL_OUT)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for --json."""
+        cell = self.cell
+        return {
+            "profile": cell.profile,
+            "visible_angle": cell.visible_angle,
+            "task": cell.task,
+            "policy": cell.policy,
+            "episodes": len(self.duration),
+            "mean_s": self.mean,
+            "sem_s": self.sem,
+            "std_s": self.std,
+            "out_of_bounds_share": self.out,
+            "reference": {
+                "mean_s": cell.mean,
+                "sem_s": cell.sem,
+                "std_s": cell.std,
+                "out_of_bounds_share": cell.out,
+                "episodes": cell.n,
+            },
+            "ratio": self.ratio._asdict(),
+            "goal": cell.goal,
+            "goal_reached": self.reached,
+        }
+
+
+def reference(name: str) -> dict[str, Any]:
+    """A file of the reference measurements, `hold_times` or `process_statistics`."""
+    folder = importlib.resources.files("keepaway_sim") / "reference"
+    data: dict[str, Any] = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    return data
+
+
+def reference_cells() -> list[Cell]:
+    """All measurements of hold times."""
+    times = reference("hold_times")
+    return [
+        Cell(profile, angle, task, policy, **numbers)
+        for profile, name in PROFILES.items()
+        for angle in (360, 90)
+        for task, policies in times[name].get(f"visible_angle_{angle}", {}).items()
+        for policy, numbers in policies.items()
+    ]
+
+
+def reference_curves(profile: str) -> list[np.ndarray]:
+    """Learning curves of the reference on 3v2: means of successive blocks of BLOCK episodes [s]."""
+    curves = reference("hold_times")[PROFILES[profile]]["learning_3v2_per_200_episodes"]
+    return [np.array(curve) for curve in (curves if isinstance(curves[0], list) else [curves])]
+
+
+def reference_processes(cell: Cell) -> dict[str, Any] | None:
+    """`episodes`, `cycles` of each and mean `statistics` of recorded play; None: not recorded."""
+    recorded = reference("process_statistics")["recorded"].get(PROFILES[cell.profile], {})
+    if cell.visible_angle != 360:
+        return None
+    found: dict[str, Any] | None = recorded.get(cell.task, {}).get(cell.policy)
+    return found
+
+
+def summarize(trajectories: Trajectories, task: str) -> dict[str, Any]:
+    """Number of episodes, cycles of each, and process statistics, of recorded play."""
+    _, cycles = np.unique(trajectories.episode, return_counts=True)
+    statistics = process_statistics(trajectories, Task.parse(task).num_keepers)
+    return {"episodes": len(cycles), "cycles": cycles.tolist(), "statistics": statistics}
+
+
+def training(cell: Cell, episodes: int) -> Training:
+    """Trials of so many episodes in which a cell's keepers play."""
+    return Training(
+        task=cell.task,
+        profile=cell.profile,
+        visible_angle=float(cell.visible_angle),
+        policy=cell.policy,
+        episodes=episodes,
+        seed=SEED,
+    )
+
+
+def measure(cell: Cell, episodes: int, num_fields: int = 64) -> Measured:
+    """Play a cell for at least so many episodes, as many on every field."""
+    trials = training(cell, math.ceil(episodes / num_fields))
+    results = list(play(trials, range(num_fields), num_fields=num_fields))
+    cycles = np.concatenate([result.durations for result in results])
+    outcomes = np.concatenate([result.outcomes for result in results])
+    return Measured(cell, cycles * CYCLE_TIME, float(np.mean(outcomes == Outcome.OUT_OF_BOUNDS)))
+
+
+def record(cell: Cell, episodes: int, num_fields: int = 64) -> Trajectories:
+    """True positions of a cell's episodes; like the reference's without their last cycle."""
+    trials = training(cell, math.ceil(episodes / num_fields))
+    recorder = Recorder(num_fields)
+    trainer = Trainer(trials.trainer, num_fields)
+    for _ in trainer.run((trials.trial(k, None) for k in range(num_fields)), watch_cycle=recorder):
+        pass
+    return recorder.trajectories()
+
+
+def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
+    """Learning curves of 3v2 from scratch, (num_trials, num_blocks).
+
+    Means of successive blocks of BLOCK episodes [s]. All trials are played side by side. The
+    learner is the reference framework's: its order of players and its tile widths.
+    """
+    trials = Training(
+        task="3v2", profile=profile, ordering="k1", tile_widths="framework",
+        episodes=episodes, seed=SEED,
+    )  # fmt: skip
+    durations = {r.trial.label: r.durations for r in play(trials, range(num_trials))}
+    played = np.stack([durations[number] for number in range(num_trials)])
+    blocks = played[:, : episodes // BLOCK * BLOCK].reshape(num_trials, -1, BLOCK)
+    return np.asarray(blocks.mean(axis=2) * CYCLE_TIME)
+
+
+class Recorder:
+    """Keeps the true positions of all episodes of a world, cycle by cycle."""
+
+    def __init__(self, num_fields: int) -> None:
+        self._rows: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(num_fields)]
+        self._counts: list[np.ndarray] = [np.zeros(0)] * num_fields
+
+    def __call__(self, world: World) -> None:
+        """Take note of the cycle that the world has come to."""
+        state, seen = world.state, world.perceptions
+        kinds = world.commands[:, :, 0]
+        for f in np.flatnonzero(state.running & (seen.outcome == Outcome.IN_PLAY)):
+            done = np.stack([kinds[f] == kind for kind in (KICK, DASH, TURN)], axis=1)
+            begins = seen.cycle[f] == 0
+            self._counts[f] = np.zeros(done.shape, int) if begins else self._counts[f] + done
+            objects = np.concatenate([state.position[f], state.velocity[f]], axis=1)
+            episode = np.array([f, seen.episode[f]])
+            self._rows[f].append((episode, objects, self._counts[f]))
+
+    def trajectories(self) -> Trajectories:
+        """All episodes, one after the other."""
+        rows = [row for field in self._rows for row in field]
+        named, objects, counts = (np.stack(column) for column in zip(*rows, strict=True))
+        _, episode = np.unique(named, axis=0, return_inverse=True)
+        return Trajectories(episode.ravel(), objects[:, -1], objects[:, :-1], counts)

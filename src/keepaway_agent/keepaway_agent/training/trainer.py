@@ -1,0 +1,484 @@
+"""Training in one process: a World of many fields, with learners for every player of each.
+
+A trial is one team's life, from its first episode to a stop rule: its own world, its own learners,
+its own random numbers. The trainer plays as many trials side by side as it has fields, and gives a
+field that has become free to the next trial. What a trial gives depends on the trial alone: it is
+the same to the last bit alone, among a hundred, and in any number of processes; and its players
+are those of the ROS nodes, decision for decision.
+
+Random numbers: with the seed sequence S of a trial, the world takes the child (0,) of S, and the
+policy of player p the child (1, p). `trial_seed(seed, number)` is S for numbered trials; a match of
+ROS nodes is trial 0.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from keepaway_agent.actions import Outcome, Role
+from keepaway_agent.compiled import compiled, entry_point
+from keepaway_agent.errors import AgentError
+from keepaway_agent.learning import sarsa
+from keepaway_agent.learning.cmac import Tiling, make_tiling
+from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE, SarsaConfig
+from keepaway_agent.learning.weights import HOURS_PER_CYCLE
+from keepaway_agent.playing import policies
+from keepaway_agent.playing.policies import (
+    Player,
+    View,
+    end_episode,
+    keeper_decision,
+    make_player,
+    taker_decision,
+)
+from keepaway_sim.task import Task
+from keepaway_sim.world.config import CYCLE_TIME, Config
+from keepaway_sim.world.streams import RandomStreams
+from keepaway_sim.world.world import World
+
+WATCH_INTERVAL: Final = 200
+"""Cycles between two calls of whoever watches a run."""
+
+
+@dataclass(frozen=True)
+class TrainerConfig:
+    """What is the same for all trials of a trainer."""
+
+    task: Task = field(default_factory=Task)
+    world: Config = field(default_factory=Config)
+    sarsa: SarsaConfig = field(default_factory=SarsaConfig)
+    ordering: str = "ball"  # what ranks players in keepers' state variables, or k1
+    tile_widths: str = "default"  # or framework
+    decision_interval: int = policies.TAKER_DECISION_INTERVAL  # [cycles] between takers' choices
+    shared: bool = False  # all keepers of a trial learn one value function
+
+    def tiling(self, role: Role) -> Tiling:
+        """The tiling of a role's state variables."""
+        task = self.task
+        return make_tiling(
+            role,
+            task.num_keepers,
+            task.num_takers,
+            task.field_length,
+            task.field_width,
+            self.tile_widths,
+        )
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """When a trial is over: at the first of these.
+
+    Raises:
+        AgentError: a rule that never stops, or that makes no sense.
+    """
+
+    max_episodes: int | None = None
+    max_cycles: int | None = None  # an episode that runs then is dropped
+    threshold: float | None = None  # [s] the mean duration over a window is more than this
+    window: int = 1000  # [episodes]
+    min_cycles: int = 0  # the threshold stops no trial before
+
+    def __post_init__(self) -> None:
+        if self.max_episodes is None and self.max_cycles is None:
+            raise AgentError("a trial needs max_episodes or max_cycles: it may never end otherwise")
+        for name in ("max_episodes", "max_cycles", "threshold", "window"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise AgentError(f"{name}={value}: give a positive number")
+
+
+class Moment(NamedTuple):
+    """A cycle of a trial that is watched: all have answered, and the world has not gone on yet."""
+
+    world: World
+    field: int  # of the world, on which the trial is played
+    action: np.ndarray  # (num_players,) int64, what everybody asks for where a decision is due
+    target: np.ndarray  # (num_players,) int64
+    values: list[np.ndarray]  # what each player's learner expected; empty where none was asked
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One team's life.
+
+    Weights are (num_actions, num_features, num_tiles, num_tilings) for all players of the role
+    to start from, or the same with a leading axis, one for each player.
+    """
+
+    seed: np.random.SeedSequence
+    stop: StopRule
+    keeper_policy: str = "learn"
+    taker_policy: str = "hand"
+    keeper_weights: np.ndarray | None = None
+    taker_weights: np.ndarray | None = None
+    snapshots: tuple[int, ...] = ()  # numbers of episodes after which keepers' weights are kept
+    label: Any = None  # whatever its owner knows it by
+    watch: Callable[[Moment], None] | None = None  # is shown every cycle
+
+
+@dataclass(frozen=True, eq=False)
+class TrialResult:
+    """What a trial gave."""
+
+    trial: Trial
+    durations: np.ndarray  # (num_episodes,) int32 [cycles]
+    outcomes: np.ndarray  # (num_episodes,) int8, `Outcome`
+    reached: bool  # did the mean duration pass the threshold?
+    keeper_weights: np.ndarray | None  # (num_keepers, num_actions, ..) if they were learned
+    taker_weights: np.ndarray | None  # ditto of takers
+    snapshots: dict[int, np.ndarray]  # keepers' weights by number of episodes
+
+    @property
+    def hours(self) -> float:
+        """Simulated hours played."""
+        return float(self.durations.sum()) * HOURS_PER_CYCLE
+
+
+@dataclass
+class Progress:
+    """How far a run has got."""
+
+    trials: int = 0  # finished
+    episodes: int = 0
+    cycles: int = 0  # of finished episodes
+
+
+def trial_seed(seed: int, number: int) -> np.random.SeedSequence:
+    """The seed sequence of a run's trial `number`."""
+    return np.random.SeedSequence(seed, spawn_key=(number,))
+
+
+def child_seed(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:
+    """A child of a trial's seed sequence: (0,) is the world's, (1, p) the policy of player p."""
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *key))
+
+
+class Trainer:
+    """Plays trials, `num_fields` at a time.
+
+    Attributes:
+        config: what is the same for all trials.
+        progress: of the run that goes on, or of the last.
+    """
+
+    def __init__(self, config: TrainerConfig, num_fields: int = 128) -> None:
+        """Lay out the fields and make room for the learners.
+
+        Raises:
+            KeepawayError, AgentError: settings with which nobody can play.
+        """
+        task = config.task
+        self.config, self.progress = config, Progress()
+        self._world = World(task, config.world, num_fields)
+        self._teams = {role: _Team(config, role, num_fields) for role in Role}
+        self._streams = RandomStreams(
+            num_fields * task.num_players, reserve=UNIFORMS_PER_CHOICE, block=512
+        )
+        shape = (num_fields, task.num_players)
+        self._policy = np.zeros(shape, dtype=np.int64)
+        self._action = np.zeros(shape, dtype=np.int64)
+        self._target = np.zeros(shape, dtype=np.int64)
+        self._for_decide_all = (
+            self._world.perceptions,
+            self._teams[Role.KEEPER].learners,
+            self._teams[Role.TAKER].learners,
+            self._policy,
+            self._teams[Role.KEEPER].player,
+            self._teams[Role.TAKER].player,
+            self._streams.uniforms,
+            self._streams.cursor,
+            np.zeros(task.num_players, dtype=np.int64),
+            self._action,
+            self._target,
+        )
+        self._decide_all = entry_point(decide_all, 0, num_fields, *self._for_decide_all)
+        self._lives: list[_Life | None] = [None] * num_fields
+        self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
+        self._watched: set[int] = set()  # fields whose trial has a `watch`
+
+    def run(
+        self,
+        trials: Iterable[Trial],
+        watch: Callable[[Progress], None] | None = None,
+        watch_cycle: Callable[[World], None] | None = None,
+    ) -> Generator[TrialResult, None, None]:
+        """Play trials, and give each one's result as soon as it is over.
+
+        Args:
+            trials: as many as one likes; the next is asked for when a field is free.
+            watch: is told of the progress every WATCH_INTERVAL cycles.
+            watch_cycle: is shown the world before every cycle.
+
+        Raises:
+            AgentError: a trial that cannot be played.
+        """
+        waiting, self.progress = iter(trials), Progress()
+        fields = range(self._world.num_fields)
+        try:
+            for number in fields:
+                self._start_next(number, waiting)
+            for cycle in itertools.count(1):
+                self._decide(0, len(fields))
+                for number in self._fields_at_an_end():
+                    if result := self._end_episode(number):
+                        self._start_next(number, waiting)
+                        self._decide(number, number + 1)
+                        yield result
+                if not self._world.state.running.any():
+                    return
+                if watch_cycle:
+                    watch_cycle(self._world)
+                self._world.step(self._action, self._target)
+                if watch and cycle % WATCH_INTERVAL == 0:
+                    watch(self.progress)
+        finally:
+            for number in fields:
+                self._world.stop(number)
+
+    def _start_next(self, number: int, waiting: Iterator[Trial]) -> None:
+        """Give a field to the next trial, and kick off; let it rest if there is none."""
+        trial = next(waiting, None)
+        self._watched.discard(number)
+        if trial is None:
+            self._world.stop(number)
+            return
+        task = self.config.task
+        for player in range(task.num_players):
+            policy = trial.keeper_policy if player < task.num_keepers else trial.taker_policy
+            self._policy[number, player] = make_player(player, task.num_keepers, policy).policy
+            generator = np.random.default_rng(child_seed(trial.seed, 1, player))
+            self._streams.seed(number * task.num_players + player, generator)
+        self._teams[Role.KEEPER].prepare(number, trial.keeper_policy, trial.keeper_weights)
+        self._teams[Role.TAKER].prepare(number, trial.taker_policy, trial.taker_weights)
+        self._lives[number] = _Life(trial)
+        self._cycles_left[number] = trial.stop.max_cycles or _ENDLESS
+        self._world.start(number, child_seed(trial.seed, 0))
+        if trial.watch:
+            self._watched.add(number)
+
+    def _fields_at_an_end(self) -> list[int]:
+        """Fields whose episode is over, or whose trial has used up its cycles."""
+        seen = self._world.perceptions
+        over = (seen.outcome != _IN_PLAY) | (seen.cycle >= self._cycles_left)
+        ended: list[int] = np.flatnonzero(over & self._world.state.running).tolist()
+        return ended
+
+    def _end_episode(self, number: int) -> TrialResult | None:
+        """Take note of a field's episode; the trial's result if that was its last."""
+        life = self._lives[number]
+        assert life is not None
+        cycle = int(self._world.perceptions.cycle[number])
+        outcome = int(self._world.perceptions.outcome[number])
+        if outcome != _IN_PLAY:
+            life.count(cycle, outcome)
+            self.progress.episodes += 1
+            self.progress.cycles += cycle
+            if len(life.durations) in life.trial.snapshots:
+                life.snapshots[len(life.durations)] = self._teams[Role.KEEPER].weights(number)
+        self._cycles_left[number] -= cycle
+        if not life.is_over() and self._cycles_left[number] > 0:
+            return None
+        self.progress.trials += 1
+        return self._result(number, life)
+
+    def _result(self, number: int, life: _Life) -> TrialResult:
+        trial = life.trial
+        keepers, takers = self._teams[Role.KEEPER], self._teams[Role.TAKER]
+        return TrialResult(
+            trial=trial,
+            durations=np.array(life.durations, dtype=np.int32),
+            outcomes=np.array(life.outcomes, dtype=np.int8),
+            reached=life.reached,
+            keeper_weights=keepers.weights(number) if trial.keeper_policy in _LEARNED else None,
+            taker_weights=takers.weights(number) if trial.taker_policy in _LEARNED else None,
+            snapshots=life.snapshots,
+        )
+
+    def _decide(self, first: int, last: int) -> None:
+        """Let players of fields first..last-1 answer, and pay those whose episode is over."""
+        self._streams.refill()
+        unused = self._streams.cursor.copy()
+        self._decide_all(first, last, *self._for_decide_all)
+        for number in self._watched.intersection(range(first, last)):
+            self._show(number, unused)
+
+    def _show(self, number: int, unused: np.ndarray) -> None:
+        """Show a trial's moment; whoever chose has used up numbers of its stream since `unused`."""
+        life, task = self._lives[number], self.config.task
+        assert life is not None
+        assert life.trial.watch is not None
+        streams = slice(number * task.num_players, (number + 1) * task.num_players)
+        chose = self._streams.cursor[streams] != unused[streams]
+        keepers = self._teams[Role.KEEPER].expected(number, chose[: task.num_keepers])
+        takers = self._teams[Role.TAKER].expected(number, chose[task.num_keepers :])
+        asked = self._action[number], self._target[number]
+        life.trial.watch(Moment(self._world, number, *asked, keepers + takers))
+
+
+_IN_PLAY: Final = int(Outcome.IN_PLAY)
+_ENDLESS: Final = np.iinfo(np.int64).max
+_LEARNED: Final = ("learn", "greedy")
+
+
+class _Team:
+    """The learners of one role on all fields.
+
+    Attributes:
+        learners: `Learners`, field by field.
+        player: the first player of the role, described by its `Player`.
+    """
+
+    def __init__(self, config: TrainerConfig, role: Role, num_fields: int) -> None:
+        task = config.task
+        keeps = role == Role.KEEPER
+        self._size = task.num_keepers if keeps else task.num_takers
+        self.learners = sarsa.make_learners(
+            num_fields * self._size,
+            task.num_keepers,
+            config.tiling(role),
+            config.sarsa,
+            self._size if keeps and config.shared else 1,
+        )
+        self._has_learners = np.zeros(num_fields, dtype=np.bool_)
+        first = 0 if keeps else task.num_keepers
+        self.player = make_player(
+            first, task.num_keepers, "learn", config.ordering, config.decision_interval
+        )
+
+    def prepare(self, number: int, policy: str, weights: np.ndarray | None) -> None:
+        """Let the team on a field begin with these weights, or knowing nothing.
+
+        Raises:
+            AgentError: weights of another shape.
+        """
+        rows = self._rows(number)
+        for i in rows:
+            sarsa.forget(self.learners, i)
+        self._has_learners[number] = policy in _LEARNED
+        if policy not in _LEARNED:
+            return
+        shape = (self._size, *sarsa.tiles_of(self.learners, 0).shape)
+        given = np.zeros(1) if weights is None else weights
+        if weights is not None and weights.shape not in (shape, shape[1:]):
+            raise AgentError(f"weights of shape {weights.shape}: the team takes {shape[1:]}")
+        for i, own in zip(rows, np.broadcast_to(given, shape), strict=True):
+            sarsa.tiles_of(self.learners, i)[:] = own
+
+    def weights(self, number: int) -> np.ndarray:
+        """What the team on a field has learned, (num_players, num_actions, ..), a copy."""
+        return np.stack([sarsa.tiles_of(self.learners, i) for i in self._rows(number)])
+
+    def expected(self, number: int, chose: np.ndarray) -> list[np.ndarray]:
+        """What each player's learner expected of its choices; empty where none has just chosen."""
+        values, asked = self.learners.values, chose & self._has_learners[number]
+        return [
+            values[i].copy() if known else values[i, :0]
+            for i, known in zip(self._rows(number), asked, strict=True)
+        ]
+
+    def _rows(self, number: int) -> range:
+        return range(number * self._size, (number + 1) * self._size)
+
+
+class _Life:
+    """What a trial has gone through so far."""
+
+    def __init__(self, trial: Trial) -> None:
+        self.trial = trial
+        self.durations: list[int] = []
+        self.outcomes: list[int] = []
+        self.snapshots: dict[int, np.ndarray] = {}
+        self.reached = False
+        self._cycles = self._cycles_in_window = 0
+
+    def count(self, cycles: int, outcome: int) -> None:
+        """Take note of an episode."""
+        stop = self.trial.stop
+        self.durations.append(cycles)
+        self.outcomes.append(outcome)
+        self._cycles += cycles
+        self._cycles_in_window += cycles
+        if len(self.durations) > stop.window:
+            self._cycles_in_window -= self.durations[-stop.window - 1]
+        if stop.threshold is not None and len(self.durations) >= stop.window:
+            mean = self._cycles_in_window * CYCLE_TIME / stop.window
+            self.reached = self.reached or mean > stop.threshold
+
+    def is_over(self) -> bool:
+        """Whether the stop rule says so; its `max_cycles` is the trainer's business."""
+        stop = self.trial.stop
+        if stop.max_episodes is not None and len(self.durations) >= stop.max_episodes:
+            return True
+        return self.reached and self._cycles >= stop.min_cycles
+
+
+@compiled
+def decide_all(
+    first,
+    last,
+    perceptions,
+    keepers,
+    takers,
+    policy,
+    keeper,
+    taker,
+    uniforms,
+    cursor,
+    order,
+    action,
+    target,
+):
+    """Let every player answer whose answer is due, and pay those whose episode is over.
+
+    Args:
+        first: the first of the fields that are looked at.
+        last: one past the last of them.
+        perceptions: of the World.
+        keepers: Learners, num_keepers rows for each field.
+        takers: Learners, num_takers rows for each field.
+        policy: (num_fields, num_players) int64, each player's policy.
+        keeper: Player, what is the same for all keepers.
+        taker: Player, what is the same for all takers.
+        uniforms: (num_fields * num_players, block), a stream for each player.
+        cursor: (num_fields * num_players,) int64, where each stream goes on.
+        order: (num_players,) int64, scratch.
+        action: (num_fields, num_players) int64, written.
+        target: (num_fields, num_players) int64, written.
+    """
+    num_players, n = policy.shape[1], keeper.num_keepers
+    m = num_players - n
+    for f in range(first, last):
+        outcome, cycle = perceptions.outcome[f], perceptions.cycle[f]
+        for p in range(num_players):
+            team = keeper if p < n else taker
+            player = Player(p, n, policy[f, p], team.ordering, team.interval)
+            if outcome != Outcome.IN_PLAY:
+                if p < n:
+                    end_episode(keepers, f * n + p, player, cycle, outcome)
+                else:
+                    end_episode(takers, f * m + p - n, player, cycle, outcome)
+            if not perceptions.decision_due[f, p]:
+                continue
+            view = View(
+                perceptions.position[f, p],
+                perceptions.age[f, p],
+                perceptions.cycles_to_ball[f, p],
+                perceptions.ball_kickable[f, p],
+                cycle,
+            )
+            stream = f * num_players + p
+            at = cursor[stream]
+            draws = uniforms[stream, at : at + UNIFORMS_PER_CHOICE]
+            if p < n:
+                answer = keeper_decision(keepers, f * n + p, player, view, draws, order)
+            else:
+                answer = taker_decision(takers, f * m + p - n, player, view, draws, order)
+            action[f, p], target[f, p], chose = answer
+            if chose:
+                cursor[stream] = at + UNIFORMS_PER_CHOICE

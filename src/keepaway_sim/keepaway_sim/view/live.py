@@ -1,0 +1,354 @@
+"""A match that is on, for browsers: its messages made into the page's events, and a small server.
+
+The server speaks to this machine only, unless told otherwise, and answers only requests that
+name it as their host and come from its own page. Events go over one long HTTP answer for each
+browser (server-sent events); a browser that is slow misses cycles, nobody waits for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import json
+import queue
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+import numpy as np
+
+from keepaway_sim.bags.match_bag import EpisodeSummary, Track
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.task import Outcome, Task
+from keepaway_sim.view.page import encoded, episode_data, frames, match_data, page
+from keepaway_sim.wire import messages
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.world.config import NEVER
+
+FRAME_PERIOD = 0.05  # [s] browsers are not sent more moments
+MAX_BROWSERS = 16
+QUEUE_SIZE = 400  # events that a slow browser may be behind
+KEEP_ALIVE = 5.0  # [s] a sign of life, by which browsers that are gone are noticed
+EVERYWHERE = "0.0.0.0"
+KEPT_EPISODES = 100_000  # told to browsers that come later
+
+Event = tuple[str, str]
+"""Its kind, and its data as JSON: match, frame or episode."""
+
+
+class LiveMatch:
+    """Makes events of a match's messages, whatever order the topics come in.
+
+    Most of what is said is never shown, so messages are kept as they came and read when they are.
+
+    Attributes:
+        history: the events that a browser needs to follow from now on.
+    """
+
+    def __init__(self, send: Callable[[Event], None]) -> None:
+        """Events go to `send` as they are made."""
+        self._send = send
+        self._task: Task | None = None
+        self._match: Event | None = None
+        self._episodes: list[Event] = []
+        self._moments: dict[tuple[int, int], _Moment] = {}
+        self._sent_at = 0.0
+        self._lock = threading.Lock()
+
+    @property
+    def history(self) -> list[Event]:
+        """What was said before: the match, and its finished episodes."""
+        with self._lock:
+            return [*([self._match] if self._match else []), *self._episodes]
+
+    def feed(self, message_type: str, data: bytes) -> list[str]:
+        """Take a message.
+
+        Returns:
+            the names of the players, if it was a Match that tells them.
+
+        Raises:
+            KeepawayError: bytes that are not such a message, or not one of this match.
+        """
+        try:
+            if message_type == messages.MATCH:
+                return self._begin(codec(message_type).decode(data))
+            if self._task is not None and message_type == messages.EPISODE:
+                self._end_episode(codec(message_type).decode(data))
+            elif self._task is not None:
+                self._keep(message_type, data)
+        except (ValueError, IndexError, struct.error) as error:
+            raise KeepawayError(f"a {message_type} that makes no sense here: {error}") from error
+        return []
+
+    def show(self) -> None:
+        """Send a moment, if it is time for one, of which all has been said, and episodes' ends.
+
+        All has been said of the moments before the newest.
+
+        Raises:
+            KeepawayError: bytes that are not such a message, or not one of this match.
+        """
+        newest = max(self._moments, default=None)
+        for key in sorted(self._moments):
+            is_last = self._is_last(self._moments[key])
+            if key == newest and not is_last:
+                return
+            moment = self._moments.pop(key)
+            now = time.monotonic()
+            if moment.state and (is_last or now - self._sent_at >= FRAME_PERIOD):
+                self._sent_at = now
+                self._send(("frame", json.dumps([key[0], encoded(self._frame(moment))])))
+
+    def _begin(self, said: dict[str, Any]) -> list[str]:
+        sides = said["field_length"], said["field_width"]
+        self._task = Task(said["num_keepers"], said["num_takers"], *sides)
+        self._moments.clear()
+        with self._lock:
+            self._match = ("match", json.dumps(match_data(said)))
+            self._episodes.clear()
+        self._send(self._match)
+        return list(said["player_names"])
+
+    def _end_episode(self, said: dict[str, Any]) -> None:
+        outcome = Outcome(said["outcome"])
+        summary = EpisodeSummary(
+            said["number"], 0, 0, said["cycles"], said["duration"], outcome, said["lost_by"]
+        )
+        event = ("episode", json.dumps(episode_data(summary)))
+        with self._lock:
+            self._episodes.append(event)
+            del self._episodes[:-KEPT_EPISODES]
+        self._send(event)
+
+    def _keep(self, message_type: str, data: bytes) -> None:
+        about = messages.read_saying(message_type, data)
+        moment = self._moments.setdefault((about.episode, about.cycle), _Moment())
+        if message_type == messages.FIELD_STATE:
+            moment.state, moment.outcome = data, about.outcome
+        elif message_type == messages.PERCEPTION:
+            moment.seen[about.player_index] = data
+        else:
+            moment.asked[about.player_index] = data
+
+    def _is_last(self, moment: _Moment) -> bool:
+        """Is it an episode's last moment, with all that is said in it?"""
+        assert self._task is not None
+        ended = moment.state and moment.outcome != Outcome.IN_PLAY
+        return bool(ended) and len(moment.seen) >= self._task.num_players
+
+    def _frame(self, moment: _Moment) -> np.ndarray:
+        assert self._task is not None
+        try:
+            return frames(_track(self._task, moment), self._task)
+        except (ValueError, IndexError) as error:
+            raise KeepawayError(f"a moment that makes no sense here: {error}") from error
+
+
+@dataclass
+class _Moment:
+    """What was said in one cycle, as bytes."""
+
+    state: bytes = b""
+    outcome: int = Outcome.IN_PLAY
+    seen: dict[int, bytes] = field(default_factory=dict)  # perceptions by player
+    asked: dict[int, bytes] = field(default_factory=dict)  # requests by player
+
+
+def _track(task: Task, moment: _Moment) -> Track:
+    """One moment's messages as a track of one cycle."""
+    num, objects = task.num_players, task.num_players + 1
+    state = codec(messages.FIELD_STATE).decode(moment.state)
+    seen = [_decoded(messages.PERCEPTION, moment.seen.get(player)) for player in range(num)]
+    asked = [_decoded(messages.ACTION_REQUEST, moment.asked.get(player)) for player in range(num)]
+    nowhere = [np.nan] * (2 * objects)
+    values = np.full((1, num, task.num_keepers), np.nan)
+    for player, request in enumerate(asked):
+        known = request.get("action_values", [])[: task.num_keepers]
+        values[0, player, : len(known)] = known
+
+    def each(said: list[dict[str, Any]], name: str, otherwise: Any) -> np.ndarray:
+        return np.array([[entry.get(name, otherwise) for entry in said]])
+
+    return Track(
+        time=np.zeros(1, dtype=np.int64),
+        outcome=np.array([state["outcome"]]),
+        cycle=np.array([state["cycle"]]),
+        position=np.array(state["positions"]).reshape(1, objects, 2),
+        velocity=np.array(state["velocities"]).reshape(1, objects, 2),
+        yaw=np.array([state["yaws"]]),
+        neck=np.array([state["neck_yaws"]]),
+        action=np.array([state["actions"]]),
+        target=np.array([state["targets"]]),
+        believed=each(seen, "positions", nowhere).reshape(1, num, objects, 2),
+        age=each(seen, "ages", [NEVER] * objects),
+        kickable=each(seen, "ball_kickable", False),
+        due=each(seen, "decision_due", False),
+        cycles_to_ball=each(seen, "cycles_to_ball", [NEVER] * num),
+        requested=each(asked, "action", -1),
+        requested_target=each(asked, "target", -1),
+        values=values,
+    )
+
+
+def _decoded(message_type: str, data: bytes | None) -> dict[str, Any]:
+    """A message's values; none of one that did not come."""
+    return {} if data is None else codec(message_type).decode(data)
+
+
+class Server:
+    """Serves the page of a live match.
+
+    Attributes:
+        match: to be fed with messages.
+        address: host and port it listens on.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
+        """Listen.
+
+        Args:
+            host: "127.0.0.1": this machine only; "0.0.0.0": every network it is in.
+            port: 0: any that is free.
+
+        Raises:
+            OSError: the port is taken, or the host is none of this machine's.
+        """
+        self.match = LiveMatch(self._broadcast)
+        self._browsers: list[queue.Queue[Event]] = []
+        self._lock = threading.Lock()
+        server = self
+
+        class Handler(_Handler):
+            live = server
+
+        self._http = ThreadingHTTPServer((host, port), Handler)
+        self._http.daemon_threads = True
+        self.address: tuple[str, int] = (host, self._http.server_port)
+        self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds it."""
+        host = "127.0.0.1" if self.address[0] == EVERYWHERE else self.address[0]
+        return f"http://{host}:{self.address[1]}/"
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._http.shutdown()
+        self._http.server_close()
+
+    def may_be_named(self, host: str) -> bool:
+        """Is this a name under which a browser may know this server?
+
+        A page of another site that got its own name resolved to this machine is refused by it;
+        in a network the server is known by this machine's name or by its numbers.
+        """
+        name, _, port = host.rpartition(":")
+        if port != str(self.address[1]):
+            return False
+        own = self.address[0]
+        if name in ("127.0.0.1", "localhost", own):
+            return True
+        return own == EVERYWHERE and (name == socket.gethostname() or _is_number(name))
+
+    @contextlib.contextmanager
+    def browser(self) -> Iterator[queue.Queue[Event]]:
+        """The events for one more browser.
+
+        Raises:
+            KeepawayError: there are too many.
+        """
+        events: queue.Queue[Event] = queue.Queue(QUEUE_SIZE)
+        with self._lock:
+            if len(self._browsers) >= MAX_BROWSERS:
+                raise KeepawayError(f"{MAX_BROWSERS} browsers are watching already")
+            self._browsers.append(events)
+        try:
+            yield events
+        finally:
+            with self._lock:
+                self._browsers.remove(events)
+
+    def _broadcast(self, event: Event) -> None:
+        with self._lock:
+            for events in self._browsers:
+                if event[0] == "match":  # whatever was before it is over
+                    events.queue.clear()
+                with contextlib.suppress(queue.Full):
+                    events.put_nowait(event)
+
+
+def _is_number(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one browser's requests."""
+
+    live: Server
+    server_version, sys_version = "keepaway", ""
+
+    def do_GET(self) -> None:
+        """The page, or its events."""
+        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        if not self.live.may_be_named(host) or origin not in (None, f"http://{host}"):
+            self.send_error(403, "This page is for its own machine's browsers")
+        elif self.path == "/":
+            self._send_page()
+        elif self.path == "/events":
+            self._send_events()
+        else:
+            self.send_error(404)
+
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002
+        """Say nothing of ordinary requests."""
+
+    def _begin(self, content_type: str) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", content_type)
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header(
+            "Content-Security-Policy",
+            "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline';"
+            " img-src data:; connect-src 'self'; frame-ancestors 'none'",
+        )
+
+    def _send_page(self) -> None:
+        text = page({"live": True, "match": None, "episodes": []}).encode()
+        self._begin("text/html; charset=utf-8")
+        self.send_header("Content-Length", str(len(text)))
+        self.end_headers()
+        self.wfile.write(text)
+
+    def _send_events(self) -> None:
+        try:
+            with self.live.browser() as events:
+                self._begin("text/event-stream")
+                self.end_headers()
+                for event in self.live.match.history:
+                    self._send_event(event)
+                while True:
+                    try:
+                        self._send_event(events.get(timeout=KEEP_ALIVE))
+                    except queue.Empty:
+                        self.wfile.write(b": still here\n\n")
+        except KeepawayError as error:
+            self.send_error(503, str(error))
+        except (BrokenPipeError, ConnectionError):
+            return
+
+    def _send_event(self, event: Event) -> None:
+        kind, data = event
+        self.wfile.write(f"event: {kind}\ndata: {data}\n\n".encode())

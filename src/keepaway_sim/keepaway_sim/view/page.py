@@ -1,0 +1,312 @@
+"""Pictures of a moment of a match, and the page to watch it: `replay.html`, one file, no network.
+
+The page's data is one int16 row ("frame") for every cycle of an episode; `layout` says where in it
+what is. A live match is sent to the page in the same frames.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import html
+import json
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle, Wedge
+
+from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.task import Action, Outcome, Role, Task
+from keepaway_sim.world.config import NEVER, Physics
+
+NONE = -32768
+"""In a frame: not known."""
+MAX_CYCLES = 12_000
+"""Cycles in a page if its episodes are not chosen: about 5 MB of 3v2."""
+GRASS, CHALK, INK = "#2c6e49", "#e9f3ec", "#10201a"
+COLOURS = {Role.KEEPER: "#56b4e9", Role.TAKER: "#ff9e4a"}
+
+
+def layout(task: Task) -> tuple[dict[str, int], int]:
+    """Where each part of a frame begins, and a frame's size.
+
+    Positions are in cm, angles in 1/10000 rad, times in cycles, action values in 1/10 cycle;
+    arrays in the order of `episodes.Track`.
+    """
+    num, objects = task.num_players, task.num_players + 1
+    counts = {
+        "cycle": 1,
+        "outcome": 1,
+        "position": 2 * objects,
+        "yaw": num,
+        "neck": num,
+        "action": num,
+        "target": num,
+        "requested": num,
+        "requested_target": num,
+        "believed": 2 * num * objects,
+        "age": num * objects,
+        "values": num * task.num_keepers,
+    }
+    starts = np.cumsum([0, *counts.values()]).tolist()
+    return dict(zip(counts, starts, strict=False)), starts[-1]
+
+
+def frames(track: Track, task: Task) -> np.ndarray:
+    """A track as the page wants it: (num_cycles, size) int16."""
+    scaled = {
+        "cycle": track.cycle,
+        "outcome": track.outcome,
+        "position": 100 * track.position,
+        "yaw": 1e4 * track.yaw,
+        "neck": 1e4 * track.neck,
+        "action": track.action,
+        "target": track.target,
+        "requested": track.requested,
+        "requested_target": track.requested_target,
+        "believed": np.where(track.age[..., None] < NEVER, 100 * track.believed, np.nan),
+        "age": track.age,
+        "values": 10 * track.values,
+    }
+    count = len(track.time)
+    columns = [_int16(scaled[name]).reshape(count, -1) for name in layout(task)[0]]
+    return np.concatenate(columns, axis=1)
+
+
+def _int16(values: np.ndarray) -> np.ndarray:
+    known = np.isfinite(values)
+    clipped = np.clip(np.rint(np.where(known, values, 0)), NONE + 1, 32767)
+    whole: np.ndarray = np.where(known, clipped, NONE).astype("<i2")
+    return whole
+
+
+def encoded(rows: np.ndarray) -> str:
+    """Frames as base64, for JSON."""
+    return base64.b64encode(rows.astype("<i2").tobytes()).decode()
+
+
+def match_data(match: Mapping[str, Any], facts: Sequence[str] = ()) -> dict[str, Any]:
+    """What the page must know of a match (a Match message's fields)."""
+    task = Task(*(match[n] for n in ("num_keepers", "num_takers", "field_length", "field_width")))
+    starts, size = layout(task)
+    angle = math.degrees(match["visible_angle"])
+    return {
+        "task": match["task"],
+        "names": list(match["player_names"]),
+        "num_keepers": task.num_keepers,
+        "field_length": task.field_length,
+        "field_width": task.field_width,
+        "cycle_time": match["cycle_time"],
+        "visible_angle": match["visible_angle"],
+        "facts": [
+            f"seed {match['seed']}",
+            f"{task.field_length:g} × {task.field_width:g} m",
+            f"players see {angle:.0f}°",
+            f"rules of {match['profile']}",
+            *facts,
+            f"version {match['code_version']}",
+        ],
+        "layout": starts,
+        "frame_size": size,
+    }
+
+
+def episode_data(episode: EpisodeSummary) -> dict[str, Any]:
+    """What the page's list says of an episode."""
+    return {
+        "number": episode.number,
+        "duration": round(episode.duration, 3),
+        "outcome": int(episode.outcome),
+        "lostBy": episode.lost_by,
+    }
+
+
+def replay_page(
+    path: Path | str, numbers: Collection[int] | None = None, max_cycles: int = MAX_CYCLES
+) -> str:
+    """The page of a bag, all in one text.
+
+    Args:
+        path: the bag.
+        numbers: the episodes that can be watched; by default some, spread over the match. All
+            are in the list and in the learning curve.
+        max_cycles: of the default choice together.
+
+    Raises:
+        KeepawayError: no such bag, or no such episodes in it.
+    """
+    bag = MatchBag(path)
+    episodes = list(bag.episodes())
+    rest = bag.unfinished()
+    if rest is not None and rest.number not in {e.number for e in episodes}:
+        episodes.append(rest)
+    wanted = chosen_episodes(episodes, numbers, max_cycles)
+    entries = []
+    for episode in episodes:
+        entry = episode_data(episode)
+        if episode.number in wanted:
+            entry["frames"] = encoded(frames(bag.track(episode), bag.task))
+        entries.append(entry)
+    facts = [f"{role} {policy}" for role, policy in _policies(bag.reader.info).items()]
+    return page({"live": False, "match": match_data(bag.match, facts), "episodes": entries})
+
+
+def page(data: Mapping[str, Any]) -> str:
+    """The page with its data in it."""
+    match = data["match"]
+    parts = {
+        "title": html.escape(f"Keepaway {match['task']}" if match else "Keepaway, live"),
+        "css": _part("page.css"),
+        "script": _part("page.js"),
+        "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+    }
+    made = _part("page.html")
+    for name, text in parts.items():
+        made = made.replace("{{" + name + "}}", text)
+    return made
+
+
+def chosen_episodes(
+    episodes: Sequence[EpisodeSummary], numbers: Collection[int] | None, max_cycles: int
+) -> set[int]:
+    """The numbers of the episodes that a page shows.
+
+    Raises:
+        KeepawayError: nothing to show.
+    """
+    have = {episode.number for episode in episodes}
+    if numbers is not None:
+        chosen = have & set(numbers)
+        if not chosen:
+            span = f"{min(have)}..{max(have)}" if have else "none"
+            raise KeepawayError(f"none of the episodes asked for is there: the bag has {span}")
+        return chosen
+    if not have:
+        raise KeepawayError("the bag has no episode")
+    every = 1
+    while sum(e.cycles for e in episodes[::every]) > max_cycles and every < len(episodes):
+        every += 1
+    return {episode.number for episode in episodes[::every]}
+
+
+def _policies(info: Mapping[str, str]) -> dict[str, str]:
+    """Who played how, where the bag says so and all of a team are alike."""
+    agents: dict[str, dict[str, Any]] = json.loads(info.get("agents", "{}"))
+    teams: dict[str, set[str]] = {}
+    for name, settings in agents.items():
+        teams.setdefault(name.split("_")[0] + "s", set()).add(str(settings.get("policy", "hand")))
+    return {team: policies.pop() for team, policies in teams.items() if len(policies) == 1}
+
+
+@functools.cache
+def _part(name: str) -> str:
+    return (resources.files("keepaway_sim.view") / "web" / name).read_text(encoding="utf-8")
+
+
+def picture(
+    track: Track, row: int, task: Task, visible_angle: float = 2 * math.pi, player: int = -1
+) -> Figure:
+    """One moment from above: players, where they look, the ball and its trail, who passes to whom.
+
+    Args:
+        track: the episode.
+        row: which of its cycles.
+        task: who plays, on what field.
+        visible_angle: of the players' views [rad].
+        player: whose belief is drawn as hollow marks; -1: nobody's.
+    """
+    figure = Figure(figsize=(6.4, 6.4 * task.field_width / task.field_length), dpi=150)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    _draw_field(axes, task)
+    _draw_trail(axes, track.position[max(0, row - 25) : row + 1, -1])
+    for k in range(task.num_players):
+        _draw_intent(axes, track, row, k, task)
+    for k, name in enumerate(task.player_names):
+        role = task.role(k)
+        face = track.yaw[row, k] + track.neck[row, k]
+        if visible_angle < 2 * math.pi - 1e-6:
+            _draw_view(axes, track.position[row, k], face, visible_angle, COLOURS[role])
+        label = f"{'K' if role == Role.KEEPER else 'T'}{name.split('_')[1]}"
+        _draw_player(axes, track.position[row, k], track.yaw[row, k], COLOURS[role], label)
+    if player >= 0:
+        _draw_belief(axes, track, row, player, task)
+    axes.add_patch(Circle(track.position[row, -1], 0.3, fc="white", ec=INK, lw=1.2, zorder=6))
+    axes.set_title(_caption(track, row), y=0.965, color="white", fontsize=11, weight="bold")
+    return figure
+
+
+def _draw_field(axes: Axes, task: Task) -> None:
+    length, width = task.field_length, task.field_width
+    axes.set_xlim(-length / 2 - 1.6, length / 2 + 1.6)
+    axes.set_ylim(-width / 2 - 1.6, width / 2 + 1.6)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.add_patch(Rectangle((-length, -width), 2 * length, 2 * width, fc=GRASS, zorder=0))
+    border = Rectangle((-length / 2, -width / 2), length, width, fill=False, ec=CHALK, lw=2)
+    axes.add_patch(border)
+
+
+def _draw_trail(axes: Axes, ball: np.ndarray) -> None:
+    for age in range(1, len(ball)):
+        x, y = ball[-age - 1 : len(ball) - age + 1].T
+        axes.plot(x, y, color="white", lw=2, alpha=0.75 * (1 - age / 26), zorder=2)
+
+
+def _draw_intent(axes: Axes, track: Track, row: int, player: int, task: Task) -> None:
+    action = track.requested[row, player]
+    target = track.requested_target[row, player]
+    if action < 0:
+        action, target = track.action[row, player], track.target[row, player]
+    if action not in (Action.PASS_BALL, Action.MARK_KEEPER):
+        return
+    ends = track.position[row, [player, target]].T
+    style = "--" if action == Action.PASS_BALL else ":"
+    axes.plot(*ends, style, color=COLOURS[task.role(player)], lw=1.6, zorder=2)
+
+
+def _draw_view(axes: Axes, at: np.ndarray, face: float, angle: float, colour: str) -> None:
+    half = math.degrees(angle) / 2
+    middle = math.degrees(face)
+    axes.add_patch(
+        Wedge((at[0], at[1]), 60.0, middle - half, middle + half, fc=colour, alpha=0.1, zorder=1)
+    )
+
+
+def _draw_player(axes: Axes, at: np.ndarray, yaw: float, colour: str, label: str) -> None:
+    radius = 2 * Physics.player_size
+    x, y = at
+    axes.add_patch(Circle((x, y), radius, fc=colour, ec=INK, lw=1.2, zorder=4))
+    ahead = (x + radius * math.cos(yaw), y + radius * math.sin(yaw))
+    axes.plot((x, ahead[0]), (y, ahead[1]), color=INK, lw=2, zorder=5)
+    axes.annotate(
+        label, (x, y - 1.1), color="white", ha="center", va="top", fontsize=9, weight="bold"
+    )
+
+
+def _draw_belief(axes: Axes, track: Track, row: int, player: int, task: Task) -> None:
+    for k in range(task.num_players + 1):
+        if k == player or track.age[row, player, k] >= NEVER:
+            continue
+        thought = track.believed[row, player, k]
+        colour = "white" if k == task.num_players else COLOURS[task.role(k)]
+        axes.plot(*np.stack([track.position[row, k], thought]).T, ":", color=colour, lw=1, zorder=3)
+        axes.add_patch(Circle(thought, 0.62, fill=False, ec=colour, lw=1.6, zorder=5))
+
+
+def _caption(track: Track, row: int) -> str:
+    seconds = (track.time[row] - track.time[0]) / 1e9
+    outcome = Outcome(int(track.outcome[row]))
+    words = "" if outcome == Outcome.IN_PLAY else f", {outcome.name.lower().replace('_', ' ')}"
+    return f"{seconds:.1f} s{words}"
+
+
+def pass_moments(track: Track) -> Iterable[int]:
+    """The rows in which a keeper freshly decided to pass, to find a picture worth taking."""
+    return np.flatnonzero((track.requested == Action.PASS_BALL).any(axis=1)).tolist()

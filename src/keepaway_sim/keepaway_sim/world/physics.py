@@ -1,0 +1,226 @@
+"""Movement, kicks and collisions of the soccer server; the only file that imports pymunk.
+
+Order of one cycle (S: stadium.cpp `step`): commands set accelerations and turns, velocities follow
+(`dash_acceleration`, `turned_yaw`, `kick_acceleration`, `moved_velocity`), pymunk moves all
+discs of all fields and finds those that touch (`Bodies.move`), and `separate` pushes overlapping
+discs apart and reverses them by the server's rule.
+
+Positions and velocities are kept on a grid of 2**-30 m. A field's place in the shared space is a
+multiple of a power of two, so adding it is exact and a field behaves to the last bit alike
+wherever it lies. The grid also absorbs the last bit in which processors' sines differ.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pymunk
+import pymunk.batch
+
+from keepaway_sim.world.compiled import compiled
+from keepaway_sim.world.geometry import TWO_PI, clip, length, wrap
+from keepaway_sim.world.streams import draw
+
+GRID = 2.0**30  # [1/m] positions and velocities are whole multiples of 1/GRID
+FIELDS_A_ROW = 16  # fields of one space lie in rows of so many
+OVERLAP = 1e-6  # [m] discs closer than touching by less than this do not collide
+SWEEPS = 10  # S: stadium.cpp, how often overlapping discs are pushed apart a cycle
+BOUNCE = -0.1  # S: stadium.cpp, velocity factor of what collided
+
+
+@compiled
+def on_grid(value):
+    """The nearest multiple of 2**-30 m."""
+    return round(value * GRID) / GRID
+
+
+@compiled
+def dash_acceleration(c, power, yaw):
+    """Acceleration (x, y) [m/cycle^2] of a dash with `power` along the body (S: leg.cpp)."""
+    effective = clip(power, c.min_dash_power, 100.0) * c.dash_power_rate
+    return effective * math.cos(yaw), effective * math.sin(yaw)
+
+
+@compiled
+def turned_yaw(c, yaw, moment, speed, noise):
+    """Body direction after a turn command (S: player.cpp `turn`).
+
+    Args:
+        moment: requested turn [rad]; a moving player turns by moment / (1 + inertia * speed).
+        speed: the player's speed [m/cycle].
+        noise: uniform in [-1, 1).
+    """
+    moment = clip(moment, -math.pi, math.pi)
+    return wrap(yaw + (1.0 + c.player_rand * noise) * moment / (1.0 + c.inertia_moment * speed))
+
+
+@compiled
+def kick_rate(c, rel_x, rel_y, yaw):
+    """Acceleration of the ball per unit of kick power (S: player.cpp `kick`).
+
+    Args:
+        rel_x, rel_y: ball relative to the player [m], field axes.
+        yaw: the player's body direction [rad].
+    """
+    direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
+    distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
+    return c.kick_power_rate * (1.0 - 0.25 * direction_share - 0.25 * distance_share)
+
+
+@compiled
+def kick_acceleration(c, power, direction, rel_x, rel_y, yaw):
+    """Acceleration (x, y) of the ball by a kick without noise; `direction` relative to yaw."""
+    size = clip(power, 0.0, 100.0) * kick_rate(c, rel_x, rel_y, yaw)
+    return size * math.cos(yaw + direction), size * math.sin(yaw + direction)
+
+
+@compiled
+def kick_noise_radius(c, power, rel_x, rel_y, yaw, ball_speed):
+    """Largest kick noise [m/cycle^2]: grows with power, bad placement and ball speed (S 12.0)."""
+    direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
+    distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
+    position_rate = 0.5 + 0.25 * (direction_share + distance_share)
+    speed_rate = 0.5 + 0.5 * ball_speed / (c.ball_speed_max * c.ball_decay)
+    return c.kick_rand * clip(power, 0.0, 100.0) / 100.0 * (position_rate + speed_rate)
+
+
+@compiled
+def limited(x, y, largest):
+    """The vector, no longer than `largest`."""
+    size = length(x, y)
+    if size > largest:
+        return x * largest / size, y * largest / size
+    return x, y
+
+
+@compiled
+def moved_velocity(vx, vy, ax, ay, accel_max, speed_max, rand, uniforms, cursor, stream):
+    """Velocity with which an object moves this cycle (S: object.cpp `_inc`).
+
+    Acceleration and speed are limited, then noise polar(U(0, rand * speed), U(-pi, pi)) is
+    added; two uniforms are read, none where nothing moves or rand is 0.
+    """
+    ax, ay = limited(ax, ay, accel_max)
+    vx, vy = limited(vx + ax, vy + ay, speed_max)
+    if rand > 0.0 and (vx != 0.0 or vy != 0.0):
+        radius = rand * length(vx, vy) * draw(uniforms, cursor, stream)
+        angle = TWO_PI * draw(uniforms, cursor, stream)
+        vx += radius * math.cos(angle)
+        vy += radius * math.sin(angle)
+    return on_grid(vx), on_grid(vy)
+
+
+@compiled
+def separate(position, velocity, radius, target, count, collided):
+    """Push overlapping discs of one field apart and reverse them, in place (S: stadium.cpp).
+
+    Each overlapping pair is moved symmetrically about its midpoint to touching; a disc in
+    several pairs goes to the mean of its places; up to ten sweeps. What collided keeps a tenth
+    of its velocity, reversed.
+
+    Args:
+        position, velocity: (num_objects, 2) of one field.
+        radius: (num_objects,) [m].
+        target, count, collided: (num_objects, 2), (num_objects,), (num_objects,), scratch.
+    """
+    num = len(radius)
+    collided[:] = False
+    for _ in range(SWEEPS):
+        target[:] = 0.0
+        count[:] = 0.0
+        for i in range(num):
+            for j in range(i + 1, num):
+                dx = position[j, 0] - position[i, 0]
+                dy = position[j, 1] - position[i, 1]
+                touching = radius[i] + radius[j]
+                distance = length(dx, dy)
+                if distance >= touching - OVERLAP:
+                    continue
+                if distance > 0.0:
+                    dx, dy = dx / distance, dy / distance
+                else:
+                    dx, dy = 1.0, 0.0
+                middle_x = 0.5 * (position[i, 0] + position[j, 0])
+                middle_y = 0.5 * (position[i, 1] + position[j, 1])
+                for k, side in ((i, -0.5), (j, 0.5)):
+                    target[k, 0] += middle_x + side * touching * dx
+                    target[k, 1] += middle_y + side * touching * dy
+                    count[k] += 1.0
+        clear = True
+        for k in range(num):
+            if count[k] > 0.0:
+                clear = False
+                collided[k] = True
+                position[k, 0] = on_grid(target[k, 0] / count[k])
+                position[k, 1] = on_grid(target[k, 1] / count[k])
+        if clear:
+            break
+    for k in range(num):
+        if collided[k]:
+            velocity[k, 0] = on_grid(BOUNCE * velocity[k, 0])
+            velocity[k, 1] = on_grid(BOUNCE * velocity[k, 1])
+
+
+class Bodies:
+    """The discs of all fields in one pymunk space.
+
+    Attributes:
+        motion: (num_fields, num_objects, 4) float64: x, y [m] with the field's place added,
+            vx, vy [m/cycle]; written by the caller before `move`, read after it.
+        place: (num_fields, 2) where each field's origin lies in the space [m].
+    """
+
+    def __init__(self, num_fields: int, radius: np.ndarray, field_side: float) -> None:
+        """Put the discs of every field into a space.
+
+        Args:
+            num_fields: how many fields.
+            radius: (num_objects,) radii of one field's discs [m].
+            field_side: the longer side of a field [m].
+        """
+        spacing = 2.0 ** math.ceil(math.log2(2.0 * field_side + 64.0))
+        index = np.arange(num_fields)
+        self.place = spacing * np.stack([index % FIELDS_A_ROW, index // FIELDS_A_ROW], axis=1)
+        self.motion = np.zeros((num_fields, len(radius), 4))
+        self.motion[:, :, :2] = self.place[:, None, :]
+        self._space = pymunk.Space()
+        self._space.iterations = 1
+        self._space.collision_bias = 1.0  # pymunk itself pushes nothing apart
+        self._space.use_spatial_hash(2.0, 10 * num_fields * len(radius))
+        self._bodies = [self._add(size) for _ in range(num_fields) for size in radius]
+        ids = np.array([body.id for body in self._bodies], dtype=np.int64)
+        order = np.argsort(ids)
+        self._sorted_ids, self._field_of_sorted = ids[order], order // len(radius)
+        self._input, self._output = pymunk.batch.Buffer(), pymunk.batch.Buffer()
+        self._contacts = pymunk.batch.Buffer()
+        self._input.set_float_buf(self.motion.data.cast("B"))
+
+    def _add(self, radius: float) -> pymunk.Body:
+        body = pymunk.Body(1.0, 1.0)
+        self._space.add(body, pymunk.Circle(body, radius))
+        return body
+
+    def move(self) -> np.ndarray:
+        """Move every disc by its velocity.
+
+        `motion` holds the new positions afterwards.
+
+        Returns:
+            Numbers of the fields (a few may stand more than once) in which discs may touch.
+        """
+        pymunk.batch.set_space_bodies(self._space, _MOTION, self._input)
+        self._space.step(1.0)
+        self._output.clear()
+        pymunk.batch.get_space_bodies(self._space, pymunk.batch.BodyFields.POSITION, self._output)
+        moved = np.frombuffer(self._output.float_buf())
+        self.motion[:, :, :2] = moved.reshape(*self.motion.shape[:2], 2)
+        self._contacts.clear()
+        pymunk.batch.get_space_arbiters(
+            self._space, pymunk.batch.ArbiterFields.BODY_A_ID, self._contacts
+        )
+        ids = np.frombuffer(self._contacts.int_buf(), dtype=np.int64)
+        return self._field_of_sorted[np.searchsorted(self._sorted_ids, ids)]
+
+
+_MOTION = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY

@@ -1,0 +1,165 @@
+"""Figures of numbers worked out before: nothing is estimated here.
+
+Figures are made without a display and without pyplot's global state. Every file says in its
+metadata and in a line below the axes what made it.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import ArrayLike, NDArray
+
+from keepaway_transfer.reports.statistics import Curve, Interval, SurvivalCurve
+
+COLOURS = ("#444444", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Okabe and Ito's, which colour-blind people can tell apart; the first is for the scratch row."""
+FAINT, BAND = 0.45, 0.18  # opacity of single trials and of intervals
+
+Floats = NDArray[np.float64]
+
+
+class CurveGroup(NamedTuple):
+    """The learning curves of one row of a study."""
+
+    trials: Floats  # (num_shown, num_points) [s], the ones drawn alone
+    mean: Curve  # over all trials of the row
+
+
+def learning_curves(
+    hours: Floats, groups: Mapping[str, CurveGroup], threshold: float, title: str
+) -> Figure:
+    """Figure 3 of the paper: single trials and their mean with its interval, one colour a group.
+
+    Args:
+        hours: (num_points,) simulated hours of training.
+        groups: label -> curves; the first is drawn grey and dotted, as learning from scratch.
+        threshold: of the mean duration, a dashed line [s].
+        title: above the axes.
+    """
+    figure, axes = _figure(title, "Training time (simulated hours)", "Episode duration (s)")
+    for (label, group), colour in zip(groups.items(), COLOURS, strict=False):
+        style = ":" if colour == COLOURS[0] else "-"
+        axes.plot(hours, group.trials.T, style, color=colour, linewidth=0.8, alpha=FAINT)
+        axes.plot(hours, group.mean.estimate, color=colour, linewidth=2.2, label=label)
+        axes.fill_between(
+            hours, group.mean.low, group.mean.high, color=colour, alpha=BAND, linewidth=0
+        )
+    axes.axhline(threshold, color="black", linestyle="--", linewidth=0.8)
+    axes.annotate(
+        f"threshold {threshold:g} s", (0, threshold), xytext=(4, 3), textcoords="offset points",
+        fontsize=8,
+    )  # fmt: skip
+    axes.set_xlim(left=0)
+    axes.legend(frameon=False, loc="lower right")
+    return figure
+
+
+def time_to_threshold(
+    rows: Sequence[str],
+    target: Sequence[Interval],
+    total: Sequence[Interval],
+    scratch: Interval,
+    *,
+    title: str,
+    rows_are: str,
+    connected: bool = True,
+) -> Figure:
+    """Hours to the threshold, row by row.
+
+    Args:
+        rows: label of each row, in order.
+        target: hours on the target task alone.
+        total: hours on source and target task together.
+        scratch: hours of learning from scratch, a band across.
+        title: above the axes.
+        rows_are: what the rows differ in, below the axes.
+        connected: by lines, as rows are whose order means something.
+    """
+    figure, axes = _figure(title, rows_are, "Simulated hours to threshold")
+    axes.axhspan(scratch.low, scratch.high, color=COLOURS[0], alpha=BAND, linewidth=0)
+    axes.axhline(scratch.estimate, color=COLOURS[0], linestyle=":", label="from scratch")
+    places = np.arange(len(rows))
+    for label, intervals, colour, shift in (
+        ("target task", target, COLOURS[1], -0.08),
+        ("source + target", total, COLOURS[2], 0.08),
+    ):
+        estimate, low, high = np.array(intervals).T
+        axes.errorbar(
+            places + shift, estimate, [estimate - low, high - estimate], color=colour,
+            marker="o", markersize=5, capsize=3, linewidth=1.2, label=label,
+            linestyle="-" if connected else "none",
+        )  # fmt: skip
+    axes.set_xticks(places, rows)
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False)
+    return figure
+
+
+def share_reached(curves: Mapping[str, SurvivalCurve], limit: float, title: str) -> Figure:
+    """Share of trials that reached the threshold by each hour (one less Kaplan-Meier)."""
+    figure, axes = _figure(title, "Training time (simulated hours)", "Share at the threshold")
+    for (label, curve), colour in zip(curves.items(), _colours(len(curves)), strict=True):
+        times = np.concatenate([[0.0], curve.times, [limit]])
+        share = np.concatenate([[1.0], curve.share])
+        reached = 1 - np.append(share, share[-1])
+        axes.step(times, reached, where="post", color=colour, linewidth=1.5, label=label)
+    if all(curve.share.size and curve.share[-1] == 0 for curve in curves.values()):
+        limit = min(limit, 1.05 * max(curve.times[-1] for curve in curves.values()))
+    axes.set_xlim(0, limit)
+    axes.set_ylim(0, 1.02)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    return figure
+
+
+def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
+    """Distribution of episode durations: the share of episodes still going on.
+
+    Args:
+        groups: label -> durations [s] of first episodes (dotted) and of last ones.
+        title: above the axes.
+    """
+    figure, axes = _figure(title, "Time since kick-off (s)", "Share of episodes still going on")
+    for (label, (first, last)), colour in zip(groups.items(), _colours(len(groups)), strict=True):
+        starts, ends = (np.sort(np.asarray(one, dtype=np.float64)) for one in (first, last))
+        label = f"{label} (mean {starts.mean():.1f} s, then {ends.mean():.1f} s)"
+        for ordered, style, name in ((starts, ":", None), (ends, "-", label)):
+            going_on = 1 - np.arange(1, len(ordered) + 1) / len(ordered)
+            axes.step(
+                np.concatenate([[0.0], ordered]), np.concatenate([[1.0], going_on]), style,
+                where="post", color=colour, linewidth=1.5, label=name,
+            )  # fmt: skip
+    axes.set_xlim(left=0)
+    axes.set_ylim(0, 1.02)
+    axes.legend(frameon=False)
+    return figure
+
+
+def save(figure: Figure, path: Path | str, made_by: str) -> None:
+    """Write a PNG that tells what made it: study, settings, seed, version."""
+    figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
+    figure.savefig(path, dpi=150, metadata={"Description": made_by})
+
+
+def _figure(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
+    above_made_by = ConstrainedLayoutEngine(rect=(0, 0.02, 1, 0.98))
+    figure = Figure(figsize=(7.2, 4.6), layout=above_made_by)
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=11, loc="left")
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _colours(count: int) -> list[str]:
+    """`count` colours to tell lines apart: the palette's, or a scale if it has too few."""
+    if count <= len(COLOURS):
+        return list(COLOURS[:count])
+    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0, 0.95, count))]

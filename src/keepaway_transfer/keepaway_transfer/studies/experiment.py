@@ -1,0 +1,108 @@
+"""Running a study: which trials are left, and any executor to play them on.
+
+Trials are played in batches (`batch.play`), one batch a task of a `concurrent.futures.Executor`:
+processes on this machine, or a cluster's through its own executor (Dask's `Client.get_executor`).
+A trial gives the same whatever batch it is in, so a run can be stopped and gone on with anywhere.
+"""
+
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
+
+from keepaway_transfer.studies.results import ResultsFolder, Trial
+from keepaway_transfer.studies.study import Study
+
+Key = tuple[str, int]  # a row's name and a trial's number
+Play = Callable[[Study, Sequence[Key]], list[Trial]]
+
+TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
+
+
+def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...]]:
+    """The trials that are left, in batches of about `batch` that are played together.
+
+    Rows that share their trials' source runs stay together, so that those are played once. All
+    rows get on at the same pace: a study that is stopped early has about as many trials of each.
+
+    >>> from keepaway_transfer.studies.study import load_study
+    >>> plan(load_study("tiny"), done={("0", 1)}, batch=4)[:2]
+    [(('0', 0), ('0', 2), ('0', 3)), (('4', 0), ('4', 1), ('4', 2), ('4', 3))]
+    """
+    names = [row.name for row in study.rows]
+    numbers = range(study.trials)
+    if study.shared_sources:
+        together = max(1, batch // len(names))
+        groups = [
+            [(name, number) for number in some for name in names]
+            for some in _chunks(numbers, together)
+        ]
+    else:
+        groups = [
+            [(name, number) for number in some]
+            for some in _chunks(numbers, batch)
+            for name in names
+        ]
+    left = [tuple(key for key in group if key not in done) for group in groups]
+    return [group for group in left if group]
+
+
+def run(
+    study: Study, results: ResultsFolder, executor: Executor, play: Play, batch: int
+) -> Iterator[Trial]:
+    """Play the trials that are left and yield each once it is on the disk.
+
+    Stopping the iteration gives up the batches that were not begun.
+    """
+    batches = plan(study, results.done, batch)
+    futures = [executor.submit(play, study, keys) for keys in batches]
+    try:
+        for future in as_completed(futures):
+            for trial in future.result():
+                results.append(trial)
+                yield trial
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+class Progress:
+    """How much of a study is done and how long the rest will take at the same rate.
+
+    A trial weighs as many episodes as it may be expected to play.
+    """
+
+    def __init__(
+        self, study: Study, done: Collection[Key], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._weights = {
+            row.name: row.source_episodes + TYPICAL_TARGET_EPISODES for row in study.rows
+        }
+        self.trials = study.trials * len(study.rows)
+        left = [name for keys in plan(study, done, batch=1) for name, _ in keys]
+        self.done = self.trials - len(left)
+        self._left = sum(self._weights[name] for name in left)
+        self._played = 0
+        self._clock, self._start = clock, clock()
+
+    def add(self, trial: Trial) -> None:
+        """Count a trial that was played."""
+        weight = self._weights[trial.row]
+        self.done += 1
+        self._left -= weight
+        self._played += weight
+
+    @property
+    def seconds_left(self) -> float:
+        """Estimated wall time to the end [s]; infinite before the first trial."""
+        if not self._played:
+            return float("inf")
+        return (self._clock() - self._start) * self._left / self._played
+
+    def __str__(self) -> str:
+        minutes = self.seconds_left / 60
+        left = "unknown" if minutes == float("inf") else f"{minutes:.0f} min"
+        return f"{self.done}/{self.trials} trials, time left {left}"
+
+
+def _chunks(numbers: range, size: int) -> list[range]:
+    return [numbers[start : start + size] for start in range(0, len(numbers), size)]

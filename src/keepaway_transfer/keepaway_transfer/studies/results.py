@@ -1,0 +1,198 @@
+"""The results of a study on disk: a folder that trials are appended to, one by one.
+
+`study.json` holds the settings, the code version and the command; `trials.jsonl` one JSON object a
+line and trial. A line is on the disk before the next trial is waited for, so that a run can be
+killed at any moment; half a line is cut off when the folder is opened to go on. A folder takes
+trials of one study only.
+"""
+
+import fcntl
+import gzip
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from keepaway_transfer.errors import StudyError
+from keepaway_transfer.studies.study import Study, study_from
+
+STUDY_FILE, TRIALS_FILE = "study.json", "trials.jsonl"
+
+
+@dataclass(frozen=True)
+class SourceRun:
+    """What a trial trained on before the target task."""
+
+    task: str
+    episodes: int
+    cycles: int  # simulated, of 0.1 s
+    keeper: int  # index of the keeper whose weights went on
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial as it was played; every measure is worked out from it later."""
+
+    row: str
+    number: int  # within the row
+    sources: tuple[SourceRun, ...]
+    cycles: tuple[int, ...]  # duration of each episode of the target task [cycles of 0.1 s]
+    greedy_cycles: tuple[int, ...]  # the same, then played without learning or exploring
+    code_version: str
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """What tells this trial from all others of its study."""
+        return self.row, self.number
+
+
+@dataclass(frozen=True)
+class Results:
+    """A results folder that was read: the study and its trials so far."""
+
+    study: Study
+    command: str
+    code_version: str  # that the folder was begun with
+    trials: tuple[Trial, ...]
+
+
+def read_results(folder: Path | str) -> Results:
+    """Read a results folder, also one whose trials were packed into `trials.jsonl.gz`.
+
+    Raises:
+        StudyError: no results there, or a line that is no trial, with its number.
+    """
+    head = _read_head(Path(folder))
+    try:
+        trials = tuple(_read_trials(Path(folder)))
+        return Results(study_from(head["study"]), head["command"], head["code_version"], trials)
+    except StudyError:
+        raise
+    except (KeyError, ValueError) as error:
+        raise StudyError(f"{folder} holds no results: {error!r}") from error
+
+
+class ResultsFolder:
+    """A results folder that one running study writes to. Made by `open_results`."""
+
+    def __init__(self, file: IO[str], done: frozenset[tuple[str, int]]) -> None:
+        self._file = file
+        self.done = done  # keys of the trials that were there when it was opened
+
+    def append(self, trial: Trial) -> None:
+        """Add a trial and wait until it is on the disk."""
+        self._file.write(json.dumps(asdict(trial), separators=(",", ":")) + "\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+
+@contextmanager
+def open_results(
+    folder: Path | str,
+    study: Study,
+    *,
+    command: str,
+    code_version: str,
+    resume: bool = False,
+    any_code: bool = False,
+) -> Iterator[ResultsFolder]:
+    """Begin a results folder, or go on with one of the same settings and code.
+
+    Args:
+        folder: made if it does not exist.
+        study: whose trials will be appended.
+        command: that the folder is begun with, kept beside the results.
+        code_version: of this run; every trial carries the version it was played with.
+        resume: go on if there are results.
+        any_code: go on also with code of another version.
+
+    Raises:
+        StudyError: results are there and `resume` is not asked for; they were made with other
+            settings or code; another process is writing to them.
+    """
+    folder = Path(folder)
+    head = {"study": {**study.settings, "trials": study.trials}, "command": command}
+    head["code_version"] = code_version
+    if not (folder / STUDY_FILE).exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        _write_atomically(folder / STUDY_FILE, json.dumps(head, indent=1) + "\n")
+    elif not resume:
+        raise StudyError(f"{folder} has results: add --resume to go on, or name another folder")
+    else:
+        _check_same(folder, study, code_version, any_code)
+    with open(folder / TRIALS_FILE, "a+", encoding="utf-8") as file:
+        _lock(file, folder)
+        _cut_off_half_a_line(file)
+        yield ResultsFolder(file, frozenset(trial.key for trial in _read_trials(folder)))
+
+
+def _check_same(folder: Path, study: Study, code_version: str, any_code: bool) -> None:
+    head = _read_head(folder)
+    before, now = study_from(head["study"]).settings, study.settings
+    changed = [
+        f"{name}: {before[name]} -> {now[name]}" for name in now if now[name] != before[name]
+    ]
+    if changed:
+        raise StudyError(
+            f"{folder} was made with other settings; undo the change or name another folder."
+            f" Changed: {'; '.join(changed)}"
+        )
+    if head["code_version"] != code_version and not any_code:
+        raise StudyError(
+            f"{folder} was begun with code {head['code_version']}, this is {code_version}: name"
+            " another folder, or add --any-code if the change cannot move a result"
+        )
+
+
+def _read_head(folder: Path) -> dict[str, Any]:
+    try:
+        head: dict[str, Any] = json.loads((folder / STUDY_FILE).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise StudyError(f"{folder} holds no results: it has no {STUDY_FILE}") from None
+    except (ValueError, RecursionError) as error:
+        raise StudyError(f"{folder / STUDY_FILE}: {error}") from error
+    if not isinstance(head, dict):
+        raise StudyError(f"{folder / STUDY_FILE}: not a JSON object")
+    return head
+
+
+def _read_trials(folder: Path) -> Iterator[Trial]:
+    plain, packed = folder / TRIALS_FILE, folder / f"{TRIALS_FILE}.gz"
+    with gzip.open(packed, "rt") if packed.exists() else plain.open() as lines:
+        for number, line in enumerate(lines, start=1):
+            if line.endswith("\n"):  # else it is still being written
+                yield _trial_from(line, f"{folder}, trial on line {number}")
+
+
+def _trial_from(line: str, where: str) -> Trial:
+    try:
+        data = json.loads(line)
+        data["sources"] = tuple(SourceRun(**source) for source in data["sources"])
+        data["cycles"], data["greedy_cycles"] = tuple(data["cycles"]), tuple(data["greedy_cycles"])
+        return Trial(**data)
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise StudyError(f"{where}: {error}") from error
+
+
+def _lock(file: IO[str], folder: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise StudyError(f"{folder}: another process is writing to these results") from None
+
+
+def _cut_off_half_a_line(file: IO[str]) -> None:
+    """What a writer that was killed in the middle of a line left behind."""
+    path = Path(file.name)
+    content = path.read_bytes()
+    if not content.endswith(b"\n"):
+        os.truncate(path, content.rfind(b"\n") + 1)
+
+
+def _write_atomically(path: Path, text: str) -> None:
+    written = path.with_suffix(".partial")
+    written.write_text(text, encoding="utf-8")
+    written.replace(path)

@@ -1,0 +1,96 @@
+"""Gymnasium's and PettingZoo's environments: their own tests, and the trainer's episodes."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import api_test, seed_test
+
+from keepaway_agent.environments.gym import KeeperEnv, KeepersAECEnv, KeeperVectorEnv
+from keepaway_agent.errors import AgentError
+from keepaway_agent.training.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_sim.task import Task
+
+
+def test_gymnasium_accepts_the_environment() -> None:
+    check_env(KeeperEnv(), skip_render_check=True)
+
+
+@pytest.mark.filterwarnings("ignore:Environment has not defined a render")
+def test_pettingzoo_accepts_the_environment() -> None:
+    api_test(KeepersAECEnv(), num_cycles=300)
+
+
+def test_pettingzoo_finds_it_the_same_for_a_seed() -> None:
+    seed_test(KeepersAECEnv, num_cycles=100)
+
+
+def durations(policy: str, task: str = "3v2", trials: int = 3) -> list[list[int]]:
+    """Cycles of the first four episodes of every trial, as the trainer plays them."""
+    trainer = Trainer(TrainerConfig(Task.parse(task)), num_fields=trials)
+    stop = StopRule(max_episodes=4)
+    done = {
+        result.trial.label: result.durations.tolist()
+        for result in trainer.run(
+            Trial(trial_seed(6, k), stop, keeper_policy=policy, label=k) for k in range(trials)
+        )
+    }
+    return [done[k] for k in range(trials)]
+
+
+@pytest.mark.parametrize("task", ["3v2", "4v3"])
+def test_holding_in_every_field_gives_the_trainers_episodes(task: str) -> None:
+    env = KeeperVectorEnv(3, task=task)
+    env.reset(seed=6)
+    ends: list[list[int]] = [[], [], []]
+    while min(map(len, ends)) < 4:
+        _, rewards, ended, _, infos = env.step(np.zeros(3, dtype=np.int64))
+        assert (rewards == infos["cycles"]).all()
+        for field in np.flatnonzero(ended):
+            ends[field].append(int(infos["cycle"][field]))
+    assert [field[:4] for field in ends] == durations("hold", task)
+
+
+def test_many_fields_at_once_equal_each_alone() -> None:
+    """Field 0 of many is the only field of one, whatever is chosen beside it."""
+    many, one = KeeperVectorEnv(5), KeeperEnv()
+    states, _ = many.reset(seed=3)
+    state, _ = one.reset(seed=3)
+    rng, is_new = np.random.default_rng(0), False
+    for _ in range(300):
+        np.testing.assert_array_equal(states[0], state)
+        actions = rng.integers(3, size=5)
+        states, rewards, ended, _, infos = many.step(actions)
+        if is_new:
+            state, info = one.reset()
+            is_new = False
+        else:
+            state, reward, is_new, _, info = one.step(int(actions[0]))
+            assert (reward, is_new) == (rewards[0], ended[0])
+        assert info == {name: values[0] for name, values in infos.items()}
+
+
+def test_a_keepers_rewards_are_the_cycles_since_its_own_last_choice() -> None:
+    env, rng = KeepersAECEnv(), np.random.default_rng(2)
+    env.reset(seed=1)
+    now, last, num_agents = 0.0, dict[str, float](), set[str]()
+    while env.agents:
+        agent = env.agent_selection
+        _, reward, terminated, _, _ = env.last()
+        assert reward == now - last.get(agent, 0.0)
+        last[agent] = now
+        num_agents.add(agent)
+        env.step(None if terminated else int(rng.integers(3)))
+        now += 0.0 if terminated else env.rewards[env.agents[0]]
+    assert num_agents == set(env.possible_agents)
+
+
+def test_it_is_made_by_its_name_alone_and_by_the_dozen() -> None:
+    env = gymnasium.make("Keepaway-v0", task="4v3", disable_env_checker=True)
+    assert env.observation_space.shape == (19,)
+    assert gymnasium.make_vec("Keepaway-v0", num_envs=12).action_space.shape == (12,)
+
+
+def test_settings_that_make_no_game_are_refused() -> None:
+    with pytest.raises(AgentError, match="taker policy 'nice'"):
+        KeeperEnv(taker_policy="nice")

@@ -1,0 +1,49 @@
+"""`scripts/analyze.py` as a person calls it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from keepaway_transfer.reports.kwy import write_kwy
+from keepaway_transfer.studies.results import Trial, open_results
+from keepaway_transfer.studies.study import load_study
+
+SCRIPT = Path(__file__).parents[2] / "scripts/analyze.py"
+
+
+def analyze(*arguments):
+    return subprocess.run(
+        [sys.executable, SCRIPT, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+
+
+def test_a_results_folder_gets_its_report(tmp_path):
+    with open_results(
+        tmp_path, load_study("tiny"), command="scripts/study.py tiny", code_version="v1"
+    ) as results:
+        for row in ("0", "4"):
+            for number in range(2):
+                results.append(Trial(row, number, (), (40, 50, 60, 70, 80 + number), (60,), "v1"))
+    done = analyze(tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "| row | trials | reached |" in done.stdout
+    assert {path.name for path in tmp_path.iterdir()} >= {"table.md", "trials.csv"}
+
+
+def test_a_log_is_told_when_it_reached_the_threshold(tmp_path):
+    log = tmp_path / "log.kwy"
+    # 3,600 s of episodes of 100 s, and from there 200 s: window of two above 120 s at the first.
+    cycles = [1000] * 36 + [2000] * 4
+    write_kwy(log, cycles, [False] * 40, num_keepers=3, num_takers=2, field_size=(20, 20))
+    done = analyze(log, "--threshold", 120, "--window", 2)
+    assert done.stdout == (
+        "40 episodes of 3v2, 1.2 simulated hours: a mean of 120 s over 2 episodes"
+        " at episode 37, 1.06 h.\n"
+    )
+
+
+def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
+    done = analyze(tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("analyze: ")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,89 @@
+"""`scripts/study.py` as a person calls it: run, kill, go on, and on a cluster."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil  # type: ignore[import-untyped]  # comes with distributed
+import pytest
+from distributed import LocalCluster
+
+from keepaway_transfer.studies.results import read_results
+from keepaway_transfer.studies.study import load_study
+
+SCRIPT = Path(__file__).parents[2] / "scripts/study.py"
+TINY = load_study("tiny")
+pytestmark = pytest.mark.timeout(1200)  # the first trial on a machine waits for the compiler
+
+
+def command(*arguments):
+    return [sys.executable, str(SCRIPT), "tiny", "--workers", "1", *map(str, arguments)]
+
+
+def study(*arguments):
+    return subprocess.run(command(*arguments), capture_output=True, text=True, check=False)
+
+
+def trials_in(folder):
+    return sorted(read_results(folder).trials, key=lambda trial: trial.key)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run that nothing interrupted, and what it said."""
+    folder = tmp_path_factory.mktemp("study") / "whole"
+    return folder, study("--out", folder)
+
+
+def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
+    folder, done = whole
+    assert done.returncode == 0, done.stderr
+    assert len(trials_in(folder)) == 12
+    assert "study: 12/12 trials, time left 0 min" in done.stderr
+    head = json.loads((folder / "study.json").read_text())
+    assert head["command"].startswith("scripts/study.py tiny")
+    assert head["study"]["seed"] == TINY.seed
+
+
+@pytest.mark.parametrize(("how", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, how, code):
+    log = tmp_path / "cut" / "trials.jsonl"
+    arguments = ("--out", log.parent, "--batch", 1, "--trials", 20)
+    with subprocess.Popen(command(*arguments), stderr=subprocess.DEVNULL) as running:
+        while not log.exists() or log.read_bytes().count(b"\n") < 2:
+            assert running.poll() is None
+            time.sleep(0.01)
+        workers = psutil.Process(running.pid).children()
+        running.send_signal(how)
+    assert running.returncode == code
+    assert psutil.wait_procs(workers, timeout=30)[1] == []  # none is left behind
+    before = len(trials_in(log.parent))
+    done = study(*arguments, "--resume")
+    assert done.returncode == 0, done.stderr
+    assert f"study: {before + 1}/60 trials" in done.stderr
+    study("--out", tmp_path / "whole", "--trials", 20)
+    assert trials_in(log.parent) == trials_in(tmp_path / "whole")
+
+
+def test_results_in_the_way_are_refused_in_one_line(whole):
+    done = study("--out", whole[0])
+    assert done.returncode == 1
+    assert "add --resume to go on, or name another folder" in done.stderr
+
+
+def test_two_processes_give_the_same_results(whole, tmp_path):
+    done = study("--out", tmp_path / "two", "--workers", 2, "--batch", 3)
+    assert done.returncode == 0, done.stderr
+    assert trials_in(tmp_path / "two") == trials_in(whole[0])
+
+
+def test_a_cluster_of_two_workers_gives_the_same_results(whole, tmp_path):
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        done = study(
+            "--out", tmp_path / "x", "--scheduler", cluster.scheduler_address, "--batch", 2
+        )
+    assert done.returncode == 0, done.stderr
+    assert trials_in(tmp_path / "x") == trials_in(whole[0])

@@ -1,0 +1,296 @@
+"""The match's protocol over real DDS: nodes play what the trainer plays, whatever goes wrong."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from graph import Graph, played, trained
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from keepaway_msgs.msg import ActionRequest, AgentStatus, Episode, FieldState, Match
+from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.ros import publishing
+from keepaway_sim.ros.inbox import Inbox
+from keepaway_sim.ros.publishing import LATCHED, QUEUE
+from keepaway_sim.task import Outcome
+
+SLOW_ENOUGH = 20.0  # [s] no answer is ever late
+OUTCOME = 24  # place of a perception's outcome among its bytes
+QUICK = 0.4  # [s] who does not answer is missing soon
+
+
+@pytest.mark.parametrize("policy", ["random", "hold", "hand", "learn"])
+def test_nodes_play_what_the_trainer_plays(graph: Graph, policy: str) -> None:
+    graph.start_simulator(episodes=4, seed=11, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy=policy)
+    expected = trained(4, seed=11, policy=policy)
+    assert graph.play() == played(expected)
+    if expected.keeper_weights is not None:
+        for number, weights in enumerate(expected.keeper_weights):
+            agent = graph.players[f"keeper_{number + 1}"].agent
+            assert agent is not None
+            np.testing.assert_array_equal(agent.learned("").values, weights)
+
+
+def test_a_larger_task_is_played_the_same_too(graph: Graph) -> None:
+    graph.start_simulator(task="4v3", episodes=2, answer_timeout=SLOW_ENOUGH)
+    graph.start_players("4v3", policy="random")
+    assert graph.play() == played(trained(2, policy="random", task="4v3"))
+
+
+def test_it_waits_for_everybody_and_says_for_whom(graph: Graph) -> None:
+    graph.start_simulator(episodes=1, answer_timeout=SLOW_ENOUGH)
+    for name in ("keeper_1", "keeper_3", "taker_1", "taker_2"):
+        graph.start_player(name)
+    graph.play(until=lambda: graph.simulator.roster.absent == ["keeper_2"])
+    assert graph.call(Trigger, "start").message == "waits for keeper_2"
+    graph.start_player("keeper_2")
+    assert graph.play() == played(trained(1))
+
+
+def test_perceptions_that_are_lost_are_sent_again(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    say, count = publishing.Voice.say, 0
+
+    def lose_some(self: publishing.Voice, topic: str, data: bytes, time: int) -> None:
+        nonlocal count
+        is_in_play = topic.endswith("perception") and data[OUTCOME] == Outcome.IN_PLAY
+        count += is_in_play
+        if not is_in_play or count % 97:
+            say(self, topic, data, time)
+
+    monkeypatch.setattr(publishing.Voice, "say", lose_some)
+    graph.start_simulator(episodes=2, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    assert graph.play() == played(trained(2, policy="random"))
+
+
+def test_an_episode_whose_end_is_lost_teaches_nothing(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    say = publishing.Voice.say
+
+    def lose_ends(self: publishing.Voice, topic: str, data: bytes, time: int) -> None:
+        is_an_end = topic == "keeper_1/perception" and data[OUTCOME] != Outcome.IN_PLAY
+        if not is_an_end or graph.simulator.num_finished == 2:
+            say(self, topic, data, time)
+
+    monkeypatch.setattr(publishing.Voice, "say", lose_ends)
+    graph.start_simulator(episodes=3, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    graph.play()
+    agent, other = graph.players["keeper_1"].agent, graph.players["keeper_2"].agent
+    assert agent is not None
+    assert other is not None
+    assert (agent.episodes, agent.cut_off, other.episodes) == (1, 2, 3)
+
+
+def test_a_frozen_player_is_missing_and_joins_at_the_next_kick_off(graph: Graph) -> None:
+    simulator = graph.start_simulator(episodes=3, answer_timeout=QUICK)
+    graph.start_players(policy="random")
+    frozen = graph.players["keeper_2"]
+    graph.play(until=lambda: simulator.num_cycles >= 3)
+    graph.executor.remove_node(frozen)
+    graph.play(until=lambda: simulator.num_finished >= 1)
+    assert simulator.roster.absent == ["keeper_2"]
+    assert simulator.roster.seats[1].missed > 3
+    graph.executor.add_node(frozen)
+    graph.play()
+    assert simulator.roster.absent == []
+    assert [episode.number for episode in graph.episodes] == [0, 1, 2]
+
+
+def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
+    simulator = graph.start_simulator(episodes=2, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    stranger = graph.node.create_publisher(ActionRequest, "keeper_1/action_request", 10)
+    lies = [
+        ActionRequest(player_index=1),
+        ActionRequest(episode=9),
+        ActionRequest(cycle=10_000),
+        ActionRequest(action=77),
+        ActionRequest(action=ActionRequest.PASS_BALL, target=0),
+        ActionRequest(action_values=[float("nan")]),
+        ActionRequest(action_values=[0.0] * 10_000),
+    ]
+
+    def lie() -> None:
+        if simulator.num_cycles % 10 == 0:
+            stranger.publish(lies[simulator.num_cycles // 10 % len(lies)])
+
+    health: list[DiagnosticArray] = []
+    graph.node.create_subscription(DiagnosticArray, "diagnostics", health.append, 10)
+    graph.hook = lie
+    assert graph.play() == played(trained(2, policy="random"))
+    assert simulator.roster.seats[0].rejected > 0
+    graph.spin_until(lambda: bool(health))
+    assert health[-1].status[1].message == "2 nodes answer for it"
+
+
+def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain: int) -> None:
+    simulator = graph.start_simulator(episodes=6, answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    stranger = Node("stranger", context=context)
+    requests = stranger.create_publisher(ActionRequest, "keeper_1/action_request", 10)
+    status = stranger.create_publisher(AgentStatus, "keeper_1/status", LATCHED)
+
+    said: set[tuple[int, int]] = set()
+
+    def meddle() -> None:
+        seen = simulator.world.perceptions
+        moment = int(seen.episode[0]), int(seen.cycle[0])
+        if moment in said:
+            return
+        said.add(moment)
+        now = dict(zip(("episode", "cycle"), moment, strict=True))
+        requests.publish(ActionRequest(action=ActionRequest.HOLD_BALL, **now))
+        if simulator.num_cycles % 10 == 0:
+            status.publish(AgentStatus(name="keeper_1", ready=True, episodes=1000))
+
+    graph.play(until=lambda: simulator.num_cycles >= 1)
+    graph.spin_until(lambda: requests.get_subscription_count() > 0)
+    graph.hook = meddle
+    assert graph.play() == played(trained(6, policy="random"))
+    assert simulator.roster.seats[0].rejected > 10
+    stranger.destroy_node()
+    context.shutdown()
+
+
+def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
+    heard: list[tuple[bytes, bytes]] = []
+    inbox = Inbox(graph.node, Episode, "told", lambda *one: heard.append(one), QUEUE)
+    publisher = graph.node.create_publisher(Episode, "told", QUEUE)
+    numbers = [1, 3]
+    for number in numbers:
+        publisher.publish(Episode(number=number))
+    graph.spin_until(lambda: len(heard) == 2)
+    known = graph.node.get_publishers_info_by_topic("told")[0].endpoint_gid
+    assert {gid for _, gid in heard} == {bytes(known)}
+    assert [deserialize_message(data, Episode).number for data, _ in heard] == numbers
+    graph.node.remove_waitable(inbox)
+    inbox.destroy()
+
+
+def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:
+    simulator = graph.start_simulator(autostart=False, answer_timeout=SLOW_ENOUGH)
+    graph.start_players()
+    graph.play(until=lambda: not simulator.roster.absent)
+    assert simulator.num_cycles == 0
+    assert graph.call(Trigger, "start").message == "plays"
+    graph.play(until=lambda: simulator.num_cycles >= 3)
+    assert graph.call(Trigger, "pause").success
+    cycles = simulator.num_cycles
+    until = time.monotonic() + 0.3
+    graph.play(until=lambda: time.monotonic() > until)
+    assert simulator.num_cycles <= cycles + 1
+    assert graph.call(Trigger, "start").success
+    assert graph.call(Trigger, "reset").success
+    graph.play(until=lambda: simulator.num_finished >= 1)
+    assert graph.episodes[0].outcome == Episode.ABORTED
+
+
+@pytest.mark.parametrize(
+    ("parameters", "why"),
+    [
+        ({"task": "3x2"}, "3x2"),
+        ({"field": "5x5"}, "field_length=5"),
+        ({"profile": "1999"}, "1999"),
+        ({"speed": -1.0}, "speed=-1"),
+        ({"seed": -1}, "seed=-1"),
+        ({"answer_timeout": 0.0}, "answer_timeout=0"),
+        ({"visible_angle": 400.0}, "visible_angle=400"),
+        ({"ball_decay": 1.5}, "ball_decay=1.5"),
+    ],
+)
+def test_parameters_that_make_no_match_are_refused(
+    graph: Graph, parameters: dict[str, object], why: str
+) -> None:
+    with pytest.raises(KeepawayError, match=why):
+        graph.start_simulator(**parameters)
+
+
+def test_only_the_tempo_changes_during_a_match(graph: Graph) -> None:
+    simulator = graph.start_simulator()
+
+    def set_to(name: str, value: float) -> bool:
+        parameter = Parameter(name, value=value).to_parameter_msg()
+        done = graph.call(SetParameters, "simulator/set_parameters", parameters=[parameter])
+        return bool(done.results[0].successful)
+
+    assert set_to("speed", 2.0)
+    assert simulator.settings.speed == 2.0
+    assert not set_to("speed", -1.0)
+    assert not set_to("ball_decay", 0.5)
+    assert simulator.settings.speed == 2.0
+
+
+def test_real_time_and_its_multiples_are_kept(graph: Graph) -> None:
+    simulator = graph.start_simulator(speed=4.0, answer_timeout=SLOW_ENOUGH)
+    graph.start_players()
+    graph.play(until=lambda: simulator.num_cycles >= 1)
+    began, first = time.monotonic(), simulator.num_cycles
+    graph.play(until=lambda: simulator.num_cycles >= first + 40)
+    assert time.monotonic() - began == pytest.approx(1.0, abs=0.25)
+
+
+def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
+    simulator = graph.start_simulator(episodes=2, seed=4, answer_timeout=SLOW_ENOUGH)
+    graph.start_players()
+    graph.play(until=lambda: simulator.num_finished >= 1)
+    seen: dict[str, list[object]] = {}
+    for topic, message, qos in (
+        ("match", Match, LATCHED),
+        ("/clock", Clock, 10),
+        ("field_state", FieldState, 10),
+        ("markers", MarkerArray, 10),
+        ("diagnostics", DiagnosticArray, 10),
+    ):
+        graph.node.create_subscription(message, topic, seen.setdefault(topic, []).append, qos)
+    graph.spin_until(lambda: bool(seen["match"]))
+    graph.play()
+    graph.spin_until(lambda: all(seen.values()))
+    match, state = seen["match"][0], seen["field_state"][-1]
+    assert isinstance(match, Match)
+    assert (match.task, match.seed, match.player_names[-1]) == ("3v2", 4, "taker_2")
+    assert isinstance(state, FieldState)
+    assert len(state.positions) == 12
+    clock = seen["/clock"][-1]
+    assert isinstance(clock, Clock)
+    assert clock.clock == state.stamp != Time()
+    health = seen["diagnostics"][-1]
+    assert isinstance(health, DiagnosticArray)
+    assert [status.name for status in health.status][:2] == ["/simulator", "/keeper_1"]
+    assert health.status[1].message == "plays"
+
+
+def test_it_writes_its_own_bag(graph: Graph, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    simulator = graph.start_simulator(episodes=1, record=str(bag), answer_timeout=SLOW_ENOUGH)
+    graph.start_players(policy="random")
+    [(cycles, _)] = graph.play()
+    simulator.close()
+    reader = BagReader(bag)
+    counts = dict.fromkeys(reader.topics, 0)
+    for message in reader.messages():
+        counts[message.topic] += 1
+    assert counts["/match"] == counts["/episode"] == 1
+    assert (
+        counts["/clock"] == counts["/field_state"] == counts["/keeper_1/perception"] == cycles + 1
+    )
+    assert counts["/taker_2/action_request"] == cycles
+    assert counts["/keeper_3/status"] == 2

@@ -1,0 +1,384 @@
+"""What players see, feel, hear and remember, by hand-worked numbers.
+
+Sources: S visualsenderplayer.cpp (what is seen) and P WorldModelUpdate.cc (what is made of it).
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import EXACT, Scene
+
+from keepaway_sim.world import sight
+from keepaway_sim.world.config import NEVER, noiseless, profile
+
+approx = pytest.approx
+
+NARROW = noiseless(profile("2005", visible_angle=90.0))
+ROUNDED = profile("2005", self_position_error=0.0, self_yaw_error=0.0)
+
+WIDE = """
+    . . . . . . . . . . a . .
+    . . . . . . . . . . . . .
+    . . . . . . 1 . . . . o .
+    . . . . . . . . . . . . .
+    . 2 . . . . . . . . . . .
+"""
+
+
+@pytest.mark.parametrize(
+    ("distance", "reported"),
+    [
+        (10.0, 10.0),  # ln 2.303 -> 2.3 -> 9.97 -> 10.0
+        (10.5, 11.0),  # ln 2.351 -> 2.4 -> 11.02 -> 11.0
+        (14.0, 13.5),  # ln 2.639 -> 2.6 -> 13.46 -> 13.5
+        (20.0, 20.1),  # ln 2.996 -> 3.0 -> 20.09 -> 20.1
+        (3.0, 3.0),
+        (0.7, 0.7),  # ln -0.357 -> -0.4 -> 0.67 -> 0.7
+    ],
+)
+def test_distances_are_rounded_on_a_logarithmic_scale(distance, reported):
+    scene = Scene("1 o", ROUNDED)
+    scene.put("o", distance, 0.0)
+    scene.look("1")
+    assert scene.seen("1", "o") == approx([reported, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("degrees", "faces", "reported"),
+    [(30.4, 0.0, 30.0), (30.6, 0.0, 31.0), (30.4, 0.5, 30.5), (-170.2, 10.0, -170.0)],
+)
+def test_directions_are_rounded_as_seen_from_the_face(degrees, faces, reported):
+    scene = Scene("1 o", ROUNDED)
+    scene.put("o", 10 * math.cos(math.radians(degrees)), 10 * math.sin(math.radians(degrees)))
+    scene.face("1", faces)
+    scene.look("1")
+    x, y = scene.seen("1", "o")
+    assert math.degrees(math.atan2(y, x)) == approx(reported)
+
+
+@pytest.mark.parametrize(
+    ("moving", "expected"),
+    [
+        ((1.05, 0.0), (1.0, 0.0)),  # 1.05 / 10 is rounded to 0.02 * 5, times 10.0
+        ((0.0, 1.0), (0.0, 0.99484)),  # 5.73 degrees a cycle are rounded to 5.7, times 10.0
+    ],
+)
+def test_changes_of_distance_and_direction_are_rounded(moving, expected):
+    scene = Scene("1 . 2", ROUNDED)
+    scene.put("2", 10.0, 0.0)
+    scene.move("2", *moving)
+    scene.look("1")
+    assert scene.s.velocity[0, 0, 1] == approx(expected, abs=1e-5)
+
+
+def test_velocities_are_those_over_ground():
+    scene = Scene(WIDE)
+    scene.move("1", 0.2, -0.3)
+    scene.move("o", -1.0, 0.5)
+    scene.move("a", 0.0, 0.4)
+    truth = scene.velocity.copy()
+    scene.s.velocity[:] = 0.0
+    scene.look("1")
+    assert scene.s.velocity[0, 0, 1:] == approx(truth[1:])  # the own one is felt, not seen
+
+
+def test_without_noise_a_player_sees_the_truth():
+    scene = Scene(WIDE)
+    for number, name in enumerate("12a"):
+        scene.face(name, 40.0 * number)
+    scene.s.position[0, 0, 1:] = 55.0
+    scene.s.body[0, 0] = 0.0
+    scene.s.age[:] = NEVER
+    scene.look("1")
+    assert scene.s.position[0, 0] == approx(scene.position)
+    assert scene.s.body[0, 0] == approx(scene.yaw)
+    assert not scene.s.age[0, 0, 1:].any()
+
+
+def test_a_narrow_view_is_a_cone_about_the_face():
+    scene = Scene(WIDE, NARROW)  # a lies at 26.6 degrees, o straight ahead, 2 at -158
+    scene.s.age[:] = 5
+    scene.look("1")
+    assert scene.s.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 0]
+    scene.s.age[:] = 5
+    scene.face("1", 75.0)
+    scene.s.neck[0, 0] = math.radians(-10.0)  # faces 65: within 45 degrees of a, not of o
+    scene.look("1")
+    assert scene.s.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 5]
+
+
+def test_a_full_view_sees_behind():
+    scene = Scene(WIDE)
+    scene.face("1", 180.0)
+    scene.s.age[:] = 5
+    scene.look("1")
+    assert not scene.s.age[0, 0, 1:].any()
+
+
+def test_what_lies_behind_is_felt_within_three_metres():
+    scene = Scene("o . . 1", NARROW)
+    for x, age in ((0.1, 0), (-0.1, 5)):
+        scene.put("o", x, 0.0)
+        scene.s.age[:] = 5
+        scene.look("1")
+        assert scene.s.age[0, 0, scene.ball] == age
+
+
+@pytest.mark.parametrize(("age", "felt"), [(12, True), (13, False)])
+def test_who_is_felt_has_no_name_unless_somebody_is_expected_there(age, felt):
+    scene = Scene("a . 1", NARROW)
+    scene.s.age[0, 0, scene.index("a")] = age
+    scene.look("1")
+    assert (scene.s.age[0, 0, scene.index("a")] == 0) == felt
+
+
+@pytest.mark.parametrize(("believed", "known"), [((5.0, 3.4), False), ((5.0, 3.6), True)])
+def test_who_is_not_where_it_must_be_seen_is_not_known_any_more(believed, known):
+    # at 34 and 36 degrees: inside the cone of 45 to each side by more and by less than 10
+    scene = Scene("1", NARROW)
+    scene.s.age[0, 0, scene.index("a")] = 2
+    scene.s.position[0, 0, scene.index("a")] = believed
+    scene.look("1")
+    assert (scene.s.age[0, 0, scene.index("a")] == 2) == known
+
+
+@pytest.mark.parametrize(
+    ("distance", "draws", "velocity"),
+    [
+        (19.9, [], 0.5),
+        (30.0, [0.49], 0.5),  # half the time half way between 20 and 40 m
+        (30.0, [0.51], 0.1),
+        (39.0, [0.04], 0.5),
+        (39.0, [0.06], 0.1),
+        (41.0, [0.0], 0.1),
+    ],
+)
+def test_far_objects_show_less_often_how_they_move(distance, draws, velocity):
+    scene = Scene("1 o", field=90.0)
+    scene.c = scene.c._replace(certain_distance=20.0)
+    scene.put("o", distance, 0.0)
+    scene.move("o", 0.5, 0.0)
+    scene.s.velocity[0, 0, scene.ball] = 0.1, 0.0
+    scene.look("1", *draws)
+    assert scene.s.velocity[0, 0, scene.ball, 0] == approx(velocity)
+
+
+@pytest.mark.parametrize(
+    ("seen", "believed"),
+    [(1.05, 1.025), (1.2, 1.2)],  # within 2 * ball_rand of the expected 1.0: the mean
+)
+def test_a_ball_that_rolls_as_expected_is_believed_half_way(seen, believed):
+    scene = Scene("1 . . . . o")
+    scene.move("o", seen, 0.0)
+    scene.s.velocity[0, 0, scene.ball] = 1.0, 0.0
+    scene.look("1")
+    assert scene.s.velocity[0, 0, scene.ball] == approx([believed, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("taker", "velocity"),
+    [(6.0, 0.0), (6.2, 0.3)],  # within 1.085 m of the ball at 5, or not
+)
+def test_a_ball_within_an_opponents_reach_is_believed_to_lie_still(taker, velocity):
+    scene = Scene("1 . . . . o a")
+    scene.put("a", taker, 0.0)
+    scene.move("o", 0.3, 0.0)
+    scene.look("1")
+    assert scene.s.velocity[0, 0, scene.ball] == approx([velocity, 0.0])
+
+
+def test_the_error_of_the_own_position_moves_everything_seen():
+    scene = Scene("1 . . . . o", noiseless(profile("2005")))
+    scene.c = scene.c._replace(self_position_error=0.15)
+    scene.look("1", 1.0, 0.25)  # +0.15 along x, -0.075 along y
+    assert scene.s.position[0, 0, 0] == approx([0.15, -0.075])
+    assert scene.s.position[0, 0, scene.ball] == approx([5.15, -0.075])
+
+
+def test_the_error_of_the_own_direction_turns_everything_seen():
+    scene = Scene("1 . . . . o")
+    scene.c = scene.c._replace(self_yaw_error=math.radians(0.3))
+    scene.look("1", 0.0)
+    assert math.degrees(scene.s.body[0, 0, 0]) == approx(-0.3)
+    assert scene.seen("1", "o") == approx(
+        [5 * math.cos(math.radians(0.3)), -5 * math.sin(math.radians(0.3))]
+    )
+
+
+def test_two_of_three_cycles_bring_something_new():
+    scene = Scene("1 2")
+    for phase in range(3):
+        scene.m.look_phase[0, 0] = phase
+        looks = [sight.looks_now(scene.c, scene.m, 0, 0, time) for time in range(9)]
+        assert sum(looks) == 6
+        assert looks[:3] == looks[3:6] == looks[6:]
+
+
+def test_with_a_period_of_one_every_cycle_brings_something_new():
+    scene = Scene("1 2")
+    scene.c = scene.c._replace(look_period=1)
+    assert all(sight.looks_now(scene.c, scene.m, 0, 0, time) for time in range(9))
+
+
+def test_what_is_not_seen_rolls_on_and_ages():
+    scene = Scene(WIDE)
+    scene.lose("a")
+    scene.move("2", 0.4, 0.0)
+    scene.move("o", 1.0, -0.5)
+    scene.s.age[0, 0, 1] = 3
+    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    s = scene.s
+    assert s.position[0, 0, 1] == approx([1.4, 0.0])
+    assert s.velocity[0, 0, 1] == approx([0.16, 0.0])  # player_decay 0.4
+    assert s.position[0, 0, scene.ball] == approx([12.0, 1.5])
+    assert s.velocity[0, 0, scene.ball] == approx([0.94, -0.47])
+    assert s.age[0, 0].tolist() == [1, 4, NEVER, 1]
+
+
+def test_the_opponent_nearest_to_the_ball_is_believed_to_come_for_it():
+    scene = Scene("a . . . 1 . . . o . . . . . b")  # a is 8 m, b 6 m from the ball
+    scene.move("a", 0.4, 0.0)
+    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    assert scene.seen("1", "b") == approx([10.0 - 0.3, 0.0])
+    assert scene.seen("1", "a") == approx([-4.0 + 0.4, 0.0])
+
+
+def test_an_own_kick_is_part_of_what_is_expected():
+    scene = Scene("1 o")
+    scene.put("o", 0.385, 0.0)
+    scene.move("o", 0.3, 0.0)
+    scene.m.command[0, 0] = sight.KICK, 50.0, math.pi / 2
+    scene.m.kicked[0, 0] = True
+    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    # 50 * 0.027 = 1.35 to the left
+    assert scene.seen("1", "o") == approx([0.685, 1.35])
+    assert scene.s.velocity[0, 0, scene.ball] == approx([0.94 * 0.3, 0.94 * 1.35])
+
+
+def test_an_own_turn_is_part_of_what_is_expected():
+    scene = Scene("1 o")
+    scene.m.turned[0, 0] = math.radians(30.0)
+    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    assert math.degrees(scene.s.body[0, 0, 0]) == approx(30.0)
+
+
+def test_own_speed_is_felt_to_a_hundredth():
+    scene = Scene("1 . . o", ROUNDED)
+    scene.velocity[0] = 0.3 * 0.777, 0.4 * 0.777  # speed 0.3885
+    sight.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
+    assert scene.s.velocity[0, 0, 0] == approx([0.6 * 0.39, 0.8 * 0.39])
+    assert scene.s.age[0, 0, 0] == 0
+
+
+def test_whoever_runs_into_the_ball_believes_it_before_its_body():
+    scene = Scene("1 . o")
+    scene.s.cycle[0] = 1
+    scene.s.position[0, 0, scene.ball] = 0.6, 0.0
+    scene.s.velocity[0, 0, scene.ball] = -0.5, 0.0
+    scene.s.velocity[0, 0, 0] = 0.9, 0.0  # expected now: 0.36; felt: reversed and slow
+    scene.velocity[0] = -0.05, 0.0
+    sight.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
+    assert scene.seen("1", "o") == approx([0.2, 0.0])
+    assert scene.s.velocity[0, 0, scene.ball] == approx([0.05, 0.0])
+
+
+def test_a_new_episode_forgets_the_last():
+    scene = Scene(WIDE)
+    scene.move("o", 1.0, 0.0)
+    uniforms, cursor = np.array([[0.7]]), np.zeros(1, dtype=np.int64)
+    sight.forget(scene.c, scene.s, scene.m, 0, 0, uniforms, cursor)
+    assert np.all(scene.s.age[0, 0] == NEVER)
+    assert not scene.s.velocity[0, 0].any()
+    assert scene.m.look_phase[0, 0] == 2  # 0.7 * 3
+
+
+HEARD = """
+    . . . . . a . . . . . . .
+    . . . . . . 2 o . . . . .
+    1 . . . . . . . . . . . 3
+"""
+
+
+def say(scene: Scene, name: str) -> None:
+    sight.speak(scene.c, scene.s, scene.speech, scene.m, 0, scene.index(name), False)
+
+
+def hear(scene: Scene, name: str, uniform: float) -> None:
+    """Let a player hear the team-mate that this random number chooses."""
+    block, cursor = np.array([[uniform]]), np.zeros(1, dtype=np.int64)
+    sight.hear(scene.c, scene.s, scene.speech, 0, scene.index(name), block, cursor)
+
+
+def test_a_player_speaks_of_the_ball_and_of_an_opponent_near_it():
+    scene = Scene(HEARD, ROUNDED)
+    scene.move("o", 0.5, 0.5)
+    say(scene, "2")
+    # steps of 1.45 and 0.93 m: ball (7, 1) -> (7.25, 0.93), taker (5, 2) -> (4.35, 1.86)
+    assert scene.speech.ball[0, 1] == approx([7.25, 0.93, 0.0, 0.0])  # within reach: lies still
+    assert scene.speech.ball_age[0, 1] == 1
+    assert scene.speech.opponent[0, 1] == scene.index("a")
+    assert scene.speech.opponent_position[0, 1] == approx([4.35, 1.86])
+    assert not scene.speech.own_said[0, 1]  # ten characters are full
+
+
+def test_a_player_far_from_all_speaks_of_itself():
+    scene = Scene(HEARD, ROUNDED)
+    scene.lose("o", 2)
+    scene.move("3", 0.4, 0.0)
+    say(scene, "3")
+    assert scene.speech.ball_age[0, 2] == -1
+    assert scene.speech.opponent[0, 2] == -1
+    assert scene.speech.own_said[0, 2]
+    assert scene.speech.own[0, 2] == approx([13.05, 0.0])  # 12.4 m in steps of 1.45
+
+
+def test_a_message_helps_who_has_not_seen_the_ball_for_four_cycles():
+    scene = Scene(HEARD, ROUNDED)
+    say(scene, "2")
+    for age, x in ((3, 7.0), (4, 7.25)):
+        scene.believe()
+        scene.s.age[0, 0, scene.ball] = age
+        hear(scene, "1", 0.1)
+        assert scene.s.position[0, 0, scene.ball, 0] == approx(x)
+    assert scene.s.age[0, 0, scene.ball] == 1
+
+
+def test_who_is_near_the_ball_trusts_itself():
+    scene = Scene(HEARD)
+    say(scene, "2")
+    scene.s.age[0, 0, scene.ball] = 8
+    scene.s.position[0, 0, scene.ball] = 2.9, 0.0
+    hear(scene, "1", 0.1)
+    assert scene.s.position[0, 0, scene.ball] == approx([2.9, 0.0])
+
+
+def test_one_message_a_cycle_is_heard_and_only_of_team_mates():
+    scene = Scene(HEARD, ROUNDED)
+    for name in "123a":
+        say(scene, name)
+    scene.s.age[0, 0] = [0, 9, 9, 9, 0]
+    hear(scene, "1", 0.6)  # the second of two team-mates: 3
+    assert scene.s.age[0, 0].tolist() == [0, 9, 1, 9, 0]
+    assert scene.s.position[0, 0, 2] == approx([11.6, 0.0])
+    hear(scene, "1", 0.4)  # 2 tells of the taker
+    assert scene.s.age[0, 0].tolist() == [0, 9, 1, 1, 0]
+    before = scene.s.position[0, 3].copy()
+    hear(scene, "a", 0.5)  # has nobody to listen to
+    np.testing.assert_array_equal(scene.s.position[0, 3], before)
+
+
+@pytest.mark.parametrize(
+    ("y", "turn", "neck"),
+    [(4.0, 0.0, 45.0), (4.0, 30.0, 15.0), (-4.0, 0.0, -45.0), (4.0, -90.0, 90.0)],
+)
+def test_a_neck_turns_toward_a_point_as_far_as_it_goes(y, turn, neck):
+    scene = Scene("1 o")
+    sight.turn_neck(scene.c, scene.s, 0, 0, 4.0, y, math.radians(turn))
+    assert math.degrees(scene.s.neck[0, 0]) == approx(neck)
+
+
+def test_exact_scenes_need_no_random_numbers():
+    scene = Scene(WIDE, EXACT)
+    for name in "12a":
+        scene.look(name)

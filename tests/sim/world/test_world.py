@@ -1,0 +1,431 @@
+"""The World: a field is its own whatever runs beside it, requests are checked, nothing explodes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.task import Action, Outcome, Task
+from keepaway_sim.world.config import NEVER, Config, noiseless, pack, profile
+from keepaway_sim.world.physics import GRID
+from keepaway_sim.world.world import World, is_legal
+
+approx = pytest.approx
+HOLD, PASS, OPEN, GO, MARK = (int(action) for action in Action)
+
+
+class Requests:
+    """Random legal requests, and for each field the same ones wherever it lies."""
+
+    def __init__(self, world: World, numbers: list[int]) -> None:
+        self.world = world
+        self._random = [np.random.default_rng([99, number]) for number in numbers]
+
+    def draw(self) -> tuple[np.ndarray, np.ndarray]:
+        """Action and target of every player of every field."""
+        n, num = self.world.task.num_keepers, self.world.task.num_players
+        u = np.stack([random.random((2, num)) for random in self._random])
+        action = np.where(np.arange(num) < n, (u[:, 0] * 4).astype(int), 3 + (u[:, 0] > 0.7))
+        target = (u[:, 1] * n).astype(int)
+        own = target == np.arange(num)
+        target[own] = (target[own] + 1) % n
+        return action, target
+
+
+def started(task: Task, config: Config, numbers: list[int]) -> World:
+    """A world whose fields play trials with these numbers."""
+    world = World(task, config, len(numbers))
+    for field, number in enumerate(numbers):
+        world.start(field, np.random.SeedSequence(7, spawn_key=(number, 0)))
+    return world
+
+
+def snapshot(world: World, field: int) -> list[np.ndarray]:
+    """Everything that one field is, copied."""
+    return [array[field].copy() for array in (*world.state, *world.perceptions)]
+
+
+def assert_same(one: list[np.ndarray], other: list[np.ndarray]) -> None:
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+CASES = [
+    pytest.param(Task(3, 2), profile("2005"), id="3v2"),
+    pytest.param(Task(4, 3, 30, 20), profile("v19"), id="4v3 v19"),
+    pytest.param(Task(2, 1), profile("2005", visible_angle=90.0), id="2v1 narrow"),
+    pytest.param(Task(11, 11, 10, 10), profile("v19", visible_angle=90.0), id="11v11 crowded"),
+]
+
+
+@pytest.mark.parametrize(("task", "config"), CASES)
+def test_a_field_alone_is_that_field_among_many(task, config):
+    numbers = [3, 14, 15, 9, 2, 6, 5, 35, 8, 97, 93, 23, 84, 62, 64, 33, 83, 27]
+    many = started(task, config, numbers)
+    requests = Requests(many, numbers)
+    lone_fields = [0, 1, 7, 16, 17]
+    alone = {field: started(task, config, [numbers[field]]) for field in lone_fields}
+    lone_requests = {field: Requests(alone[field], [numbers[field]]) for field in lone_fields}
+    for _ in range(200):
+        many.step(*requests.draw())
+        for field in lone_fields:
+            alone[field].step(*lone_requests[field].draw())
+            assert_same(snapshot(many, field), snapshot(alone[field], 0))
+    assert many.perceptions.episode.max() > 0  # kick-offs were among them
+
+
+def test_requests_may_be_any_arrays_of_whole_numbers_but_of_no_other_shape():
+    plain, other = (started(Task(3, 2), profile("2005"), [1, 2]) for _ in range(2))
+    requests = Requests(plain, [1, 2])
+    for _ in range(50):
+        action, target = requests.draw()
+        plain.step(action, target)
+        other.step(action.astype(np.int8), np.asfortranarray(target))
+        assert_same(snapshot(plain, 1), snapshot(other, 1))
+    for wrong in (action[:1], action.T, action.ravel(), action.astype(float)):
+        with pytest.raises(KeepawayError, match=r"requests of shape .* numbers of shape .2, 5"):
+            plain.step(wrong, target)
+    assert_same(snapshot(plain, 0), snapshot(other, 0))
+
+
+@pytest.mark.parametrize(("task", "config"), CASES[:2])
+def test_positions_lie_on_a_grid_that_every_place_represents(task, config):
+    world = started(task, config, list(range(40)))
+    requests = Requests(world, list(range(40)))
+    for _ in range(100):
+        world.step(*requests.draw())
+        for array in (world.state.position, world.state.velocity):
+            np.testing.assert_array_equal(array * GRID, np.round(array * GRID))
+
+
+def test_the_same_seed_gives_the_same_episodes_and_another_seed_others():
+    snapshots = []
+    for number in (1, 1, 2):
+        world = started(Task(), profile("2005"), [number])
+        requests = Requests(world, [number])
+        for _ in range(150):
+            world.step(*requests.draw())
+        snapshots.append(snapshot(world, 0))
+    assert_same(snapshots[0], snapshots[1])
+    assert not np.array_equal(snapshots[0][0], snapshots[2][0])
+
+
+def test_a_field_that_is_started_again_knows_nothing_of_before():
+    world, fresh = (started(Task(), profile("2005", visible_angle=90.0), [5]) for _ in range(2))
+    requests = Requests(world, [5])
+    for _ in range(90):
+        world.step(*requests.draw())
+    world.start(0, np.random.SeedSequence(7, spawn_key=(5, 0)))
+    again, anew = Requests(world, [5]), Requests(fresh, [5])
+    for _ in range(90):
+        assert_same(snapshot(world, 0), snapshot(fresh, 0))
+        world.step(*again.draw())
+        fresh.step(*anew.draw())
+
+
+def test_a_stopped_field_rests_while_others_play():
+    world = started(Task(), profile("2005"), [1, 2])
+    requests = Requests(world, [1, 2])
+    world.stop(0)
+    before = snapshot(world, 0)
+    for _ in range(20):
+        world.step(*requests.draw())
+    assert_same(snapshot(world, 0), before)
+    assert world.perceptions.cycle[1] == 20
+    assert not world.perceptions.decision_due[0].any()
+
+
+def test_an_aborted_episode_is_followed_by_the_next():
+    world = started(Task(), profile("2005"), [1])
+    requests = Requests(world, [1])
+    world.step(*requests.draw())
+    world.abort(0)
+    assert world.perceptions.outcome[0] == Outcome.ABORTED
+    assert not world.perceptions.decision_due.any()
+    world.step(*requests.draw())
+    assert (world.perceptions.episode[0], world.perceptions.cycle[0]) == (1, 0)
+    assert world.perceptions.outcome[0] == Outcome.IN_PLAY
+
+
+@pytest.mark.parametrize(
+    ("player", "action", "target"),
+    [
+        (0, PASS, 0),  # to itself
+        (0, PASS, 3),  # to a taker
+        (0, PASS, -1),
+        (1, MARK, 0),
+        (3, HOLD, 0),
+        (4, PASS, 0),
+        (4, OPEN, 0),
+        (4, MARK, 3),  # a taker marks keepers only
+        (2, 5, 0),
+        (2, -1, 0),
+    ],
+)
+def test_an_illegal_request_is_refused_and_nothing_is_played(player, action, target):
+    world = started(Task(), profile("2005"), [1, 2])
+    actions, targets = Requests(world, [1, 2]).draw()
+    actions[1, player], targets[1, player] = action, target
+    before = [snapshot(world, field) for field in range(2)]
+    with pytest.raises(KeepawayError) as refusal:
+        world.step(actions, targets)
+    name = world.task.player_names[player]
+    for part in (f"{name} on field 1", f"action={action}", f"target={target}", "takers go"):
+        assert part in str(refusal.value)
+    for field in range(2):
+        assert_same(snapshot(world, field), before[field])
+
+
+def test_requests_count_only_where_a_decision_is_due():
+    world = started(Task(), profile("2005"), [1])
+    actions, targets = Requests(world, [1]).draw()
+    world.abort(0)
+    actions[:] = 77
+    world.step(actions, targets)  # kicks off, whatever is asked for
+    assert world.perceptions.cycle[0] == 0
+
+
+@pytest.mark.parametrize("task", [Task(2, 1), Task(3, 2), Task(5, 4)])
+def test_legal_requests_are_those_of_the_roles(task):
+    c = pack(task, profile("2005"))
+    legal = {
+        (player, action, target)
+        for player in range(task.num_players)
+        for action in range(-1, 7)
+        for target in range(-1, task.num_players + 1)
+        if is_legal(c, player, action, target)
+    }
+    n, m, targets = task.num_keepers, task.num_takers, task.num_players + 2
+    # hold, get open, go: whatever the target; pass: the other keepers. Go, and mark each keeper.
+    assert len(legal) == n * (3 * targets + n - 1) + m * (targets + n)
+
+
+@pytest.mark.parametrize(("num_fields", "field"), [(0, 0), (-3, 0), (2, 2), (2, -1)])
+def test_fields_are_counted_from_nought(num_fields, field):
+    with pytest.raises(KeepawayError, match=r"num_fields=|field="):
+        World(Task(), profile("2005"), num_fields).start(field, np.random.SeedSequence(0))
+
+
+def lay_out(world: World, places: list[tuple[float, float]]) -> None:
+    """Put players and ball of field 0 where they are wanted, at rest."""
+    world.state.position[0] = places
+    world.state.velocity[0] = 0.0
+
+
+def test_a_rolling_ball_slows_by_its_decay():
+    world = started(Task(2, 1), noiseless(profile("2005")), [1])
+    lay_out(world, [(-10, -10), (-10, 10), (10, 10), (-2, 0)])
+    world.state.velocity[0, 3] = 1.0, 0.0
+    action = np.array([[OPEN, OPEN, GO]])
+    for x, speed in ((-1.0, 0.94), (-0.06, 0.8836), (0.8236, 0.830584)):
+        world.step(action, np.zeros_like(action))
+        assert world.state.position[0, 3] == approx([x, 0.0], abs=1e-8)
+        assert world.state.velocity[0, 3] == approx([speed, 0.0], abs=1e-8)
+
+
+def test_kicks_of_several_players_add_up():
+    # both hold the ball toward their own side: S adds their accelerations before limiting them
+    world = started(Task(2, 1), noiseless(profile("2005")), [1])
+    lay_out(world, [(0, 0), (-10, 10), (1.2, 0), (0.6, 0.3)])
+    world.perceptions.body[0] = world.state.yaw[0] = 0.0, 0.0, math.pi
+    for player in range(3):
+        world.perceptions.position[0, player] = world.state.position[0]
+        world.perceptions.velocity[0, player] = 0.0
+        world.perceptions.age[0, player] = 0
+    world.perceptions.ball_kickable[0] = [True, False, True]
+    action = np.array([[HOLD, OPEN, GO]])
+    world.step(action, np.zeros_like(action))
+    commands = world._memory.command[0]
+    assert commands[[0, 2], 0].tolist() == [3.0, 3.0]
+    total = np.zeros(2)
+    for player in (0, 2):
+        rel = np.array([(0.6, 0.3), (-0.6, 0.3)][player // 2])
+        yaw, distance = world.state.yaw[0, player], np.linalg.norm(rel)
+        off = abs(math.remainder(math.atan2(rel[1], rel[0]) - yaw, 2 * math.pi)) / math.pi
+        rate = 0.027 * (1 - 0.25 * off - 0.25 * (distance - 0.385) / 0.7)
+        angle = yaw + commands[player, 2]
+        total += rate * commands[player, 1] * np.array([math.cos(angle), math.sin(angle)])
+    assert np.linalg.norm(total) < 2.7
+    assert world.state.velocity[0, 3] == approx(0.94 * total, abs=1e-6)
+
+
+def test_a_pass_decision_is_carried_on_for_one_cycle_without_asking():
+    world = started(Task(3, 1), noiseless(profile("2005")), [1])
+    see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
+    action = np.array([[PASS, OPEN, OPEN, GO]])
+    world.step(action, np.ones_like(action))  # the ball lies behind: it is set up first
+    assert world.perceptions.ball_kickable[0, 0]
+    assert world.perceptions.decision_due[0].tolist() == [False, True, True, True]
+    world.step(np.array([[77, OPEN, OPEN, GO]]), np.zeros_like(action))
+    assert world.state.action[0, 0] == PASS
+    assert np.linalg.norm(world.state.velocity[0, 4]) > 1.0
+    assert world.perceptions.decision_due[0].all()
+
+
+@pytest.mark.parametrize(("by_rank", "receiver"), [(True, 2), (False, 1)])
+def test_a_pass_in_two_kicks_goes_to_the_keeper_that_is_of_that_rank_then(by_rank, receiver):
+    world = started(Task(3, 1), noiseless(profile("2005", pass_by_rank=by_rank)), [1])
+    see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
+    action = np.array([[PASS, OPEN, OPEN, GO]])
+    world.step(action, np.ones_like(action))  # to keeper 1, the closest
+    world.perceptions.position[0, 0, 2] = 0.0, 9.0  # now keeper 2 is
+    world.step(action, np.ones_like(action))
+    assert world.state.target[0, 0] == receiver
+
+
+def see(world: World, places: list[tuple[float, float]]) -> None:
+    """Lay out field 0, everybody facing +x, and let everybody know all of it."""
+    lay_out(world, places)
+    world.state.yaw[0] = 0.0
+    world.perceptions.body[0] = 0.0
+    world.perceptions.position[0] = places
+    world.perceptions.velocity[0] = 0.0
+    world.perceptions.age[0] = 0
+    away = np.linalg.norm(world.state.position[0, :-1] - world.state.position[0, -1], axis=1)
+    world.perceptions.ball_kickable[0] = away < 1.085
+
+
+def test_the_ball_is_taken_in_the_fifth_cycle_with_a_taker_near():
+    world = started(Task(2, 1), noiseless(profile("2005")), [1])
+    see(world, [(-9, 0), (-9, 9), (0, 0), (0.5, 0)])  # the taker holds it, keepers are far
+    action = np.array([[OPEN, OPEN, GO]])
+    counts = []
+    while world.perceptions.outcome[0] == Outcome.IN_PLAY:
+        world.step(action, np.zeros_like(action))
+        counts.append(int(world.state.take_count[0]))
+    assert counts == [1, 2, 3, 4, 4]
+    assert world.perceptions.outcome[0] == Outcome.TAKEN_AWAY
+
+
+def test_a_ball_that_is_taken_may_still_leave_the_field():
+    world = started(Task(2, 1), noiseless(profile("2005")), [1])
+    see(world, [(-9, 0), (-9, 9), (11, 0), (12.4, 0)])
+    world.state.velocity[0, 3] = 0.5, 0.0
+    world.state.take_count[0] = 4
+    action = np.array([[OPEN, OPEN, GO]])
+    world.step(action, np.zeros_like(action))
+    assert world.perceptions.outcome[0] == Outcome.OUT_OF_BOUNDS
+
+
+def test_no_taker_stays_for_ever_where_it_cannot_dash_backward():
+    # v19: both takers have the ball 1.3 m behind them, and its keeper holds it there
+    world = started(Task(), profile("v19"), [1])
+    places = [(-8.7, 7.8), (-7.7, -8.6), (6.49, 5.46), (7.42, 6.41), (6.99, 5.79), (5.65, 5.62)]
+    see(world, places)
+    world.state.yaw[0] = 0.0, 0.0, 1.81, 0.34, -0.19
+    world.perceptions.body[0] = world.state.yaw[0]
+    action = np.array([[OPEN, OPEN, HOLD, GO, GO]])
+    for _ in range(300):
+        world.step(action, np.zeros_like(action))
+        if world.perceptions.outcome[0] != Outcome.IN_PLAY:
+            break
+    assert world.perceptions.outcome[0] != Outcome.IN_PLAY
+
+
+def play(config: Config, numbers: list[int], cycles: int = 60) -> World:
+    """A world after some cycles of hold and get open, the same for all fields."""
+    world = started(Task(), config, numbers)
+    action = np.tile([HOLD, OPEN, OPEN, GO, GO], (len(numbers), 1))
+    for _ in range(cycles):
+        world.step(action, np.zeros_like(action))
+    return world
+
+
+def test_without_noise_nothing_is_drawn_between_kick_offs():
+    world = started(Task(), noiseless(profile("v19", hearing=False)), [1])
+    action = np.array([[GO, GO, OPEN, GO, GO]])
+    drawn = world._streams.cursor.copy()
+    for _ in range(10):
+        world.step(action, np.zeros_like(action))
+    assert world.perceptions.cycle[0] == 10
+    np.testing.assert_array_equal(world._streams.cursor, drawn)
+
+
+@pytest.mark.parametrize(
+    "switch",
+    [
+        {"movement_noise": False},
+        {"turn_noise": False},
+        {"kick_rand": 0.0},
+        {"quantize_step": 0.0},
+        {"direction_step": 0.0},
+        {"change_step": 0.0},
+        {"speed_step": 0.0},
+        {"self_position_error": 0.0},
+        {"self_yaw_error": 0.0},
+        {"hearing": False},
+        {"whole_commands": False},
+        {"visible_angle": 90.0},
+    ],
+    ids=lambda switch: next(iter(switch)),
+)
+def test_every_switch_makes_a_difference(switch):
+    with_it = play(profile("v19"), [1, 2, 3])
+    without = play(profile("v19", **switch), [1, 2, 3])
+    assert not np.array_equal(with_it.state.position, without.state.position)
+
+
+def test_an_exact_view_is_the_truth():
+    world = started(Task(4, 3), noiseless(profile("2005", look_period=1)), [1])
+    requests = Requests(world, [1])
+    for _ in range(120):
+        world.step(*requests.draw())
+        s = world.perceptions
+        if s.outcome[0] != Outcome.IN_PLAY:
+            continue
+        assert not s.age[0].any()
+        truth = np.broadcast_to(world.state.position[0], s.position[0].shape)
+        np.testing.assert_allclose(s.position[0], truth, atol=1e-8)
+
+
+def check_limits(world: World) -> None:
+    """All that must hold of any field in any cycle."""
+    state, s, c = world.state, world.perceptions, pack(world.task, world.config)
+    half = np.array([c.field_length, c.field_width]) / 2
+    playing = s.outcome == Outcome.IN_PLAY
+    for array in (*state, *s):
+        if array.dtype == np.float64:
+            assert np.isfinite(array).all()
+    speed = np.linalg.norm(state.velocity, axis=2)
+    assert speed[:, :-1].max() <= c.player_speed_max * (1 + c.player_rand) * c.player_decay + 1e-6
+    assert speed[:, -1].max() <= c.ball_speed_max * (1 + c.ball_rand) * c.ball_decay + 1e-6
+    assert (np.abs(state.position[playing, -1]) < half).all()
+    assert (np.abs(state.position[:, :-1]) < half + 15.0).all()  # nobody runs away
+    assert np.abs(state.yaw).max() <= math.pi
+    assert np.abs(s.neck).max() <= math.pi / 2
+    assert s.age.min() >= 0
+    assert s.age.max() <= NEVER
+    assert np.isin(s.outcome, [Outcome.IN_PLAY, Outcome.TAKEN_AWAY, Outcome.OUT_OF_BOUNDS]).all()
+    assert (state.take_count[playing] <= 4).all()
+    assert (state.take_count[s.outcome == Outcome.TAKEN_AWAY] == 4).all()
+    assert not s.decision_due[~playing].any()
+
+
+@pytest.mark.parametrize(
+    ("task", "config", "steps"),
+    [
+        pytest.param(Task(3, 2), profile("2005"), 1600, id="3v2 2005"),
+        pytest.param(Task(3, 2, 20, 20), profile("v19", visible_angle=90.0), 1600, id="3v2 v19"),
+        pytest.param(Task(4, 3), profile("v19"), 600, id="4v3 v19"),
+        pytest.param(Task(2, 1, 100, 10), profile("2005"), 100, id="2v1 long"),
+        pytest.param(Task(11, 11, 10, 10), profile("2005", visible_angle=45.0), 40, id="11v11"),
+    ],
+)
+def test_a_million_random_cycles_stay_finite_and_within_limits(task, config, steps):
+    num_fields = 256
+    world = started(task, config, list(range(num_fields)))
+    random = np.random.default_rng(3)
+    n, num = task.num_keepers, task.num_players
+    keeps = np.arange(num) < n
+    for step in range(steps):
+        u = random.random((2, num_fields, num))
+        target = (u[1] * n).astype(np.int64)
+        target = np.where(target == np.arange(num), (target + 1) % n, target)
+        action = np.where(keeps, (u[0] * 4).astype(np.int64), 3 + (u[0] > 0.7))
+        world.step(action, target)
+        if step % 2 == 0 or step < 100:
+            check_limits(world)
+    assert world.state.time.sum() == num_fields * steps
+    assert world.perceptions.episode.min() >= 0
+    assert world.perceptions.episode.max() > 1

@@ -1,0 +1,132 @@
+"""Intervals and tests on numbers worked out by hand or known from elsewhere."""
+
+import math
+
+import numpy as np
+import pytest
+
+from keepaway_transfer.reports import statistics
+
+# Eight trials: two reached the threshold at 2 and 3 h, one stopped at 3 h without, ...
+TIMES = [2, 3, 3, 5, 8, 10, 10, 10]
+REACHED = [True, True, False, True, True, False, False, False]
+
+
+@pytest.fixture
+def generator():
+    return np.random.default_rng(7)
+
+
+def test_welch_on_student_sized_numbers():
+    # Means 2 and 5, variances 1 and 4, three values each: t = -3 / sqrt(5/3).
+    comparison = statistics.welch([1, 2, 3], [3, 5, 7])
+    freedom = (1 / 3 + 4 / 3) ** 2 / ((1 / 3) ** 2 / 2 + (4 / 3) ** 2 / 2)
+    assert freedom == pytest.approx(2.941, abs=1e-3)
+    assert comparison.difference == -3.0
+    assert (comparison.low + comparison.high) / 2 == pytest.approx(-3.0)
+    assert comparison.p_value == pytest.approx(0.1041, abs=1e-3)
+
+
+def test_values_without_spread_leave_no_doubt():
+    assert statistics.welch([9.0, 9.0], [9.0, 9.0, 9.0]) == (0.0, 0.0, 0.0, 1.0)
+    assert statistics.welch([8.0, 8.0], [9.0, 9.0]) == (-1.0, -1.0, -1.0, 0.0)
+
+
+def test_arms_that_never_reach_the_threshold_do_not_differ():
+    assert statistics.logrank([9.0, 9.0], [False, False], [9.0], [False]) == 1.0
+
+
+def test_kaplan_meier_counts_a_censored_trial_as_at_risk_until_it_stopped():
+    curve = statistics.kaplan_meier(TIMES, REACHED)
+    assert curve.times.tolist() == [2, 3, 5, 8]
+    assert curve.share == pytest.approx([7 / 8, 6 / 8, 6 / 8 * 4 / 5, 6 / 8 * 4 / 5 * 3 / 4])
+
+
+def test_the_restricted_mean_is_the_area_under_the_curve():
+    interval = statistics.restricted_mean(TIMES, REACHED, limit=10)
+    assert interval.estimate == pytest.approx(2 + 0.875 + 2 * 0.75 + 3 * 0.6 + 2 * 0.45)
+    variance = 5.075**2 / 56 + 4.2**2 / 42 + 2.7**2 / 20 + 0.9**2 / 12
+    assert interval.high - interval.estimate == pytest.approx(1.959964 * math.sqrt(variance))
+
+
+def test_the_restricted_mean_without_censoring_is_the_mean():
+    times = np.array([1.0, 2.0, 4.0, 5.5])
+    interval = statistics.restricted_mean(times, [True] * 4, limit=6.0)
+    assert interval.estimate == pytest.approx(times.mean())
+    assert interval.high - interval.estimate == pytest.approx(1.959964 * times.std() / 2)
+
+
+def test_the_restricted_mean_of_trials_that_all_stopped_at_the_limit_is_the_limit():
+    assert statistics.restricted_mean([9.0] * 5, [False] * 5, limit=9.0) == (9.0, 9.0, 9.0)
+
+
+def test_logrank_agrees_with_lifelines():
+    slower = [4, 6, 9, 10, 10, 10, 10, 10], [True] * 3 + [False] * 5
+    # lifelines 0.30: logrank_test(TIMES, slower[0], REACHED, slower[1]).p_value
+    assert statistics.logrank(TIMES, REACHED, *slower) == pytest.approx(0.38007436)
+
+
+def test_the_bootstrap_interval_of_a_normal_sample_is_near_the_textbook_one(generator):
+    values = generator.normal(10, 2, size=400)
+    interval = statistics.bootstrap_mean(values, generator)
+    assert interval.estimate == values.mean()
+    assert interval.low == pytest.approx(values.mean() - 1.96 * 0.1, abs=0.03)
+    assert interval.high == pytest.approx(values.mean() + 1.96 * 0.1, abs=0.03)
+
+
+def test_values_without_spread_have_a_point_for_an_interval(generator):
+    assert statistics.bootstrap_mean([3.0, 3.0], generator) == (3.0, 3.0, 3.0)
+
+
+def test_the_mean_curve_has_students_interval_at_each_point():
+    # Values 1 and 3: mean 2, standard error 1, one degree of freedom: t = 12.706.
+    curve = statistics.mean_curve([[1.0, 5.0], [3.0, 5.0]])
+    assert curve.estimate.tolist() == [2.0, 5.0]
+    assert curve.high - curve.estimate == pytest.approx([12.706, 0.0], abs=1e-3)
+
+
+def test_the_mean_curve_ends_where_the_first_trial_stopped():
+    assert np.isnan(statistics.mean_curve([[1.0, np.nan], [3.0, 4.0]]).estimate).tolist() == [
+        False,
+        True,
+    ]
+
+
+def test_drawing_whole_clusters_widens_the_interval_when_trials_share_a_source(generator):
+    by_source = np.repeat(generator.normal(0, 1, size=20), 10)  # ten equal trials a source
+    sources = np.repeat(np.arange(20), 10)
+    alone = statistics.clustered_bootstrap(by_source, np.arange(200), generator)
+    clustered = statistics.clustered_bootstrap(by_source, sources, generator)
+    ratio = (clustered.high - clustered.low) / (alone.high - alone.low)
+    assert ratio == pytest.approx(math.sqrt(10), rel=0.1)
+
+
+def test_pairing_removes_what_a_source_gives_to_both_rows(generator):
+    source = generator.normal(0, 5, size=50)
+    interval = statistics.paired_bootstrap(source + 1.0, source, generator)
+    assert interval == pytest.approx((1.0, 1.0, 1.0))
+
+
+def test_holm_multiplies_the_smallest_by_the_number_of_rows():
+    # Sorted .01, .03, .04 by 3, 2, 1: .03, .06, .04, and never below the one before.
+    assert statistics.holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_trials_needed_for_the_effects_of_the_facts_page():
+    assert statistics.trials_needed(effect=0.20, variation=0.25) == 26
+    assert statistics.trials_needed(effect=0.10, variation=0.25) == 100
+
+
+def test_no_test_takes_fewer_than_two_trials():
+    assert statistics.trials_needed(effect=0.10, variation=0.001) == 2
+
+
+def test_detectable_effect_inverts_trials_needed():
+    assert statistics.detectable_effect(100, variation=0.25) == pytest.approx(0.10, abs=0.001)
+
+
+def test_equal_seeds_give_equal_intervals():
+    first, again = (
+        statistics.bootstrap_mean([1, 2, 4, 9], np.random.default_rng(3)) for _ in range(2)
+    )
+    assert first == again

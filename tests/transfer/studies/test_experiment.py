@@ -1,0 +1,94 @@
+"""A study is run to its end on any executor, whatever interrupts it."""
+
+import dataclasses
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from keepaway_transfer.studies.experiment import Progress, plan, run
+from keepaway_transfer.studies.results import Trial, open_results, read_results
+from keepaway_transfer.studies.study import load_study
+
+TINY = load_study("tiny")
+KEYS = [(row.name, number) for row in TINY.rows for number in range(TINY.trials)]
+
+
+def play(study, keys):
+    """Trials as if they were played: their episodes tell which they are."""
+    return [Trial(row, number, (), (len(row), number), (), "v1") for row, number in keys]
+
+
+class Power:
+    """Plays until the power fails."""
+
+    def __init__(self, batches):
+        self.batches = batches
+
+    def play(self, study, keys):
+        self.batches -= 1
+        if self.batches < 0:
+            raise InterruptedError("the power failed")
+        return play(study, keys)
+
+
+def run_all(folder, play, resume=False, study=TINY, batch=3):
+    with (
+        ThreadPoolExecutor(1) as executor,
+        open_results(folder, study, command="x", code_version="v1", resume=resume) as results,
+    ):
+        return list(run(study, results, executor, play, batch))
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@given(done=st.sets(st.sampled_from(KEYS)), batch=st.integers(1, 20))
+def test_every_trial_that_is_left_is_planned_once(shared, done, batch):
+    study = dataclasses.replace(TINY, shared_sources=shared)
+    planned = [key for keys in plan(study, done, batch) for key in keys]
+    assert len(planned) == len(set(planned))
+    assert set(planned) == set(KEYS) - done
+
+
+def test_rows_that_share_their_sources_are_played_together():
+    study = dataclasses.replace(TINY, shared_sources=True)
+    assert plan(study, set(), batch=3)[0] == (("0", 0), ("4", 0), ("8", 0))
+
+
+def test_a_run_yields_and_writes_every_trial(tmp_path):
+    trials = run_all(tmp_path, play)
+    assert sorted(trial.key for trial in trials) == sorted(KEYS)
+    assert sorted(read_results(tmp_path).trials, key=lambda t: t.key) == sorted(
+        trials, key=lambda t: t.key
+    )
+
+
+def test_a_run_that_was_interrupted_goes_on_and_repeats_nothing(tmp_path):
+    with pytest.raises(InterruptedError):
+        run_all(tmp_path / "cut", Power(2).play)
+    before = [trial.key for trial in read_results(tmp_path / "cut").trials]
+    after = [trial.key for trial in run_all(tmp_path / "cut", play, resume=True)]
+    assert len(before) == 6  # a batch of 3 of each of two rows
+    assert sorted(before + after) == sorted(KEYS)
+    run_all(tmp_path / "whole", play)
+    assert set(read_results(tmp_path / "cut").trials) == set(
+        read_results(tmp_path / "whole").trials
+    )
+
+
+def test_more_trials_are_added_to_a_study_that_is_done(tmp_path):
+    run_all(tmp_path, play)
+    more = dataclasses.replace(TINY, trials=TINY.trials + 1)
+    added = run_all(tmp_path, play, resume=True, study=more)
+    assert sorted(trial.key for trial in added) == [(row.name, TINY.trials) for row in TINY.rows]
+
+
+def test_progress_knows_the_time_left_by_the_work_that_was_done():
+    now = 100.0
+    progress = Progress(TINY, done=KEYS[:4], clock=lambda: now)
+    assert str(progress) == "4/12 trials, time left unknown"
+    for trial in play(TINY, KEYS[4:8]):  # half of what is left, bar four episodes of 12,000
+        progress.add(trial)
+    now = 160.0
+    assert progress.seconds_left == pytest.approx(60, rel=0.01)
+    assert str(progress) == "8/12 trials, time left 1 min"

@@ -1,0 +1,126 @@
+"""Results land trial by trial, survive a kill, and are never mixed or overwritten."""
+
+import dataclasses
+import gzip
+import multiprocessing
+
+import pytest
+
+from keepaway_transfer.errors import StudyError
+from keepaway_transfer.studies.results import SourceRun, Trial, open_results, read_results
+from keepaway_transfer.studies.study import load_study
+
+STUDY = load_study("tiny")
+
+
+def trial(number, row="4"):
+    source = SourceRun("2v1", 4, 321, keeper=1)
+    return Trial(row, number, (source,), (12, 34), (56,), "0.1.0+gabc")
+
+
+def opened(folder, study=STUDY, code_version="0.1.0+gabc", **options):
+    return open_results(
+        folder, study, command="scripts/study.py tiny", code_version=code_version, **options
+    )
+
+
+def append(folder, *numbers, **options):
+    with opened(folder, **options) as results:
+        for number in numbers:
+            results.append(trial(number))
+
+
+def test_what_was_appended_is_read_with_its_study_and_command(tmp_path):
+    append(tmp_path, 0, 1)
+    results = read_results(tmp_path)
+    assert results.trials == (trial(0), trial(1))
+    assert results.study == STUDY
+    assert results.command == "scripts/study.py tiny"
+
+
+def test_going_on_knows_what_is_done(tmp_path):
+    append(tmp_path, 0, 1)
+    with opened(tmp_path, resume=True) as results:
+        assert results.done == {("4", 0), ("4", 1)}
+
+
+def test_a_trial_is_on_disk_before_the_next_one(tmp_path):
+    with opened(tmp_path) as results:
+        results.append(trial(0))
+        assert len(read_results(tmp_path).trials) == 1
+
+
+def test_half_a_line_of_a_killed_writer_is_cut_off(tmp_path):
+    append(tmp_path, 0)
+    with open(tmp_path / "trials.jsonl", "a") as file:
+        file.write('{"row":"4","num')
+    assert len(read_results(tmp_path).trials) == 1
+    append(tmp_path, 1, resume=True)
+    assert read_results(tmp_path).trials == (trial(0), trial(1))
+
+
+def test_results_are_not_touched_without_resume(tmp_path):
+    append(tmp_path, 0)
+    with pytest.raises(StudyError, match="add --resume to go on, or name another folder"):
+        append(tmp_path, 1)
+    assert len(read_results(tmp_path).trials) == 1
+
+
+def test_a_changed_setting_is_refused_by_name(tmp_path):
+    append(tmp_path, 0)
+    changed = dataclasses.replace(STUDY, threshold=6.0)
+    with pytest.raises(StudyError, match=r"Changed: threshold: 5\.0 -> 6\.0"):
+        append(tmp_path, 1, study=changed, resume=True)
+
+
+def test_other_code_is_refused_unless_it_is_said_not_to_matter(tmp_path):
+    append(tmp_path, 0)
+    with pytest.raises(StudyError, match=r"begun with code 0\.1\.0\+gabc, this is 0\.1\.0\+gdef"):
+        append(tmp_path, 1, resume=True, code_version="0.1.0+gdef")
+    append(tmp_path, 1, resume=True, code_version="0.1.0+gdef", any_code=True)
+    assert len(read_results(tmp_path).trials) == 2
+
+
+def test_more_trials_are_no_changed_setting(tmp_path):
+    append(tmp_path, 0)
+    append(tmp_path, 1, study=dataclasses.replace(STUDY, trials=9), resume=True)
+    assert len(read_results(tmp_path).trials) == 2
+
+
+def _try_to_open(folder, answers):
+    try:
+        append(folder, 1, resume=True)
+    except StudyError as error:
+        answers.put(str(error))
+
+
+def test_a_second_writer_is_refused(tmp_path):
+    answers = multiprocessing.get_context("spawn").Queue()
+    with opened(tmp_path):
+        other = multiprocessing.get_context("spawn").Process(
+            target=_try_to_open, args=(tmp_path, answers)
+        )
+        other.start()
+        assert "another process is writing" in answers.get(timeout=60)
+        other.join()
+
+
+def test_packed_trials_are_read(tmp_path):
+    append(tmp_path, 0, 1)
+    plain = tmp_path / "trials.jsonl"
+    (tmp_path / "trials.jsonl.gz").write_bytes(gzip.compress(plain.read_bytes()))
+    plain.unlink()
+    assert read_results(tmp_path).trials == (trial(0), trial(1))
+
+
+def test_a_folder_without_results_is_refused(tmp_path):
+    with pytest.raises(StudyError, match=r"holds no results: it has no study\.json"):
+        read_results(tmp_path)
+
+
+def test_a_line_that_is_no_trial_is_refused_with_its_number(tmp_path):
+    append(tmp_path, 0)
+    with open(tmp_path / "trials.jsonl", "a") as file:
+        file.write("{}\n")
+    with pytest.raises(StudyError, match="trial on line 2"):
+        read_results(tmp_path)

@@ -1,0 +1,113 @@
+"""Studies are data, and data that make no study are refused by name."""
+
+import re
+
+import pytest
+
+from keepaway_transfer.errors import StudyError
+from keepaway_transfer.studies.study import FOLDER, Row, Stage, load_study, study_from
+
+PLAIN = {
+    "name": "mine",
+    "target": "4v3",
+    "threshold": 9.0,
+    "seed": 1,
+    "references": ["scratch"],
+    "rows": [
+        {"name": "scratch"},
+        {"name": "1000", "stages": [{"task": "3v2", "episodes": 1000}]},
+    ],
+}
+
+
+def test_table2_has_the_papers_rows_threshold_and_window():
+    study = load_study("table2")
+    amounts = [row.source_episodes for row in study.rows]
+    assert amounts == [0, 10, 50, 100, 250, 500, 1000, 3000, 6000, 9000]
+    assert (study.target, study.threshold, study.window, study.trials) == ("4v3", 9.0, 1000, 100)
+    assert {row.variant for row in study.rows} == {"rho"}
+
+
+def test_rho_variants_compares_at_a_thousand_episodes_with_scratch_and_with_rho():
+    study = load_study("rho_variants")
+    assert study.references == ("scratch", "rho")
+    assert {row.source_episodes for row in study.rows[1:]} == {1000}
+    assert {"rho_modified", "rho_averaged", "rescaled", "shuffled"} <= {
+        row.variant for row in study.rows
+    }
+
+
+def test_fivevfour_goes_through_4v3_and_through_3v2_and_4v3():
+    study = load_study("fivevfour")
+    assert (study.target, study.threshold, study.trials) == ("5v4", 7.5, 50)
+    chains = [[stage.task for stage in row.stages] for row in study.rows]
+    assert ["4v3"] in chains
+    assert ["3v2", "4v3"] in chains
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_study_of_the_package_loads_under_its_own_name(path):
+    assert load_study(path.stem).name == path.stem
+
+
+def test_a_study_of_ones_own_is_a_path(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text((FOLDER / "tiny.toml").read_text().replace('"tiny"', '"mine"'))
+    assert load_study(path).name == "mine"
+
+
+def test_plain_data_become_a_study():
+    study = study_from(PLAIN)
+    assert study.rows == (Row("scratch"), Row("1000", (Stage("3v2", 1000),)))
+    assert study.task("4v3").field_length == 25.0
+
+
+def test_the_number_of_trials_is_no_setting_that_decides_what_a_trial_gives():
+    assert study_from(PLAIN).settings == study_from({**PLAIN, "trials": 7}).settings
+    assert study_from(PLAIN).settings != study_from({**PLAIN, "threshold": 8.0}).settings
+
+
+def test_constants_of_world_and_learner_are_changed_by_name():
+    study = study_from({**PLAIN, "world": {"kick_rand": 0.1}, "learner": {"lambda_": 0.5}})
+    assert study.world_settings.physics.kick_rand == 0.1
+    assert study.sarsa.lambda_ == 0.5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"threshold": 0}, "threshold=0"),
+        ({"min_hours": 50, "max_hours": 40}, "min_hours=50"),
+        ({"references": ["none"]}, "reference 'none' is not one of the rows scratch, 1000"),
+        ({"references": []}, "references=[]"),
+        ({"rows": [{"name": "scratch"}] * 2}, "two rows of one name"),
+        ({"rows": [{"name": "scratch", "variant": "rho3"}]}, "variant='rho3'"),
+        ({"rows": [{"name": "scratch", "stages": [{"task": "5v4", "episodes": 1}]}]},
+         "5v4 is no source for 4v3"),
+        ({"rows": [{"name": "scratch", "stages": [{"task": "3v2", "episodes": 0}]}]}, "episodes=0"),
+        ({"treshold": 9}, "treshold"),
+        ({"world": {"kick_random": 1}}, "kick_random"),
+        ({"learner": {"alfa": 1}}, "alfa"),
+        ({"target": "4 to 3"}, "4 to 3"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_study_is_refused_by_name(change, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        study_from({**PLAIN, **change})
+
+
+def test_a_missing_entry_is_named():
+    with pytest.raises(StudyError, match="seed"):
+        study_from({key: value for key, value in PLAIN.items() if key != "seed"})
+
+
+def test_an_unknown_study_is_refused_with_those_there_are():
+    with pytest.raises(StudyError, match=r"table3.*table2"):
+        load_study("table3")
+
+
+def test_a_broken_file_is_refused_with_its_path(tmp_path):
+    path = tmp_path / "broken.toml"
+    path.write_text("name = ")
+    with pytest.raises(StudyError, match=re.escape("broken.toml")):
+        load_study(path)
