@@ -14,8 +14,8 @@ import signal
 import sys
 from pathlib import Path
 
-from keepaway_sim.analysis.tally import analyse
-from keepaway_sim.bags.writer import is_bag
+from keepaway_sim.analysis.report import analyse
+from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.errors import TransferError
 from keepaway_transfer.reports import metrics

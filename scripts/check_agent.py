@@ -17,7 +17,8 @@ import sys
 import rclpy
 from rclpy.experimental import EventsExecutor
 
-from keepaway_agent.checks.conformance import answer_times, judge, report, script
+from keepaway_agent.checks.conformance import script
+from keepaway_agent.checks.judge import answer_times, judge, report
 from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.scripted_simulator import ScriptedSimulator
 from keepaway_sim.cli.options import ros_arguments

@@ -29,14 +29,8 @@ from typing import Any
 import numpy as np
 
 from keepaway_agent.learning.weights import load_weights, save_weights
-from keepaway_agent.training.trainer import (
-    Progress,
-    StopRule,
-    Trainer,
-    TrainerConfig,
-    Trial,
-    trial_seed,
-)
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import Progress, StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer.reports import metrics, plotting

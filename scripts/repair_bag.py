@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 from keepaway_sim.bags.gaps import count_gaps
-from keepaway_sim.bags.writer import BagReader, repair
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.repair import repair
 from keepaway_sim.errors import KeepawayError
 
 

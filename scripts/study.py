@@ -23,7 +23,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
-from keepaway_agent.training.training import end_with_parent
+from keepaway_agent.training.workers import end_with_parent
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
 from keepaway_transfer.studies.batch import play

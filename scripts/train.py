@@ -28,15 +28,11 @@ from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import HOURS_PER_CYCLE
-from keepaway_agent.training.trainer import Progress
-from keepaway_agent.training.training import (
-    NUM_FIELDS,
-    RECORDED_TRIAL,
-    Training,
-    TrainingFolder,
-    play,
-)
+from keepaway_agent.training.folder import TrainingFolder
+from keepaway_agent.training.training import RECORDED_TRIAL, Training
+from keepaway_agent.training.trial import Progress
 from keepaway_agent.training.trial_recorder import TrialRecorder
+from keepaway_agent.training.workers import NUM_FIELDS, play
 from keepaway_sim.cli.options import add_options, numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.scores import Score, summary

@@ -19,12 +19,14 @@ from pathlib import Path
 
 import rclpy
 
-from keepaway_sim.bags.match_bag import MatchBag, with_markers
+from keepaway_sim.bags.marked import with_markers
+from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
-from keepaway_sim.view.live import Server
-from keepaway_sim.view.page import picture, replay_page
+from keepaway_sim.view.page import replay_page
+from keepaway_sim.view.picture import picture
+from keepaway_sim.view.server import Server
 
 LAYOUT = Path(__file__).resolve().parents[1] / "src/keepaway_sim/foxglove/keepaway.json"
 

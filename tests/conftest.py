@@ -7,12 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import domain_coordinator
+import hypothesis
 import pytest
 
 if TYPE_CHECKING:
     from graph import Graph
 
 ROOT = Path(__file__).resolve().parents[1]
+
+hypothesis.settings.register_profile("keepaway", deadline=None)  # a busy machine is no fault
+hypothesis.settings.load_profile("keepaway")
 
 # A shell lets its background jobs ignore Ctrl-C, and whatever they start: not what tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)

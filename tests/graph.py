@@ -14,14 +14,8 @@ from keepaway_agent.actions import Role
 from keepaway_agent.learning.weights import LearnedWeights
 from keepaway_agent.nodes.player import Player
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts
-from keepaway_agent.training.trainer import (
-    StopRule,
-    Trainer,
-    TrainerConfig,
-    Trial,
-    TrialResult,
-    trial_seed,
-)
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialResult, trial_seed
 from keepaway_msgs.msg import Episode
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.simulator import Simulator

@@ -9,11 +9,11 @@ import numpy as np
 
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
-from keepaway_sim.bags.match_bag import FieldRecorder, world_info
+from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.world.config import CYCLE_TIME, Config, profile
-from keepaway_sim.world.sight import Perceptions
+from keepaway_sim.world.state import Perceptions
 from keepaway_sim.world.world import World
 
 

@@ -9,9 +9,10 @@ import math
 import numpy as np
 
 from keepaway_sim.task import Task
-from keepaway_sim.world import sight
-from keepaway_sim.world.config import NEVER, Config, noiseless, pack, profile
-from keepaway_sim.world.skills import tactics
+from keepaway_sim.world import sight, state
+from keepaway_sim.world.config import NEVER, Config, noiseless, profile
+from keepaway_sim.world.constants import pack
+from keepaway_sim.world.skills import kicking, tactics
 from keepaway_sim.world.skills.prediction import cycles_to_ball
 
 EXACT = noiseless(profile("2005"))  # every noise and rounding off
@@ -42,9 +43,9 @@ class Scene:
         takers = max([1, *(ord(name) - 96 for name in places if name in "abcdefghijk")])
         self.c = pack(Task(keepers, takers, field, field), config)
         self.num_keepers, self.ball = keepers, keepers + takers
-        self.s = sight.make_perceptions(1, self.ball)
-        self.m = sight.make_memory(self.c, 1)
-        self.speech = sight.make_speech(1, self.ball)
+        self.s = state.make_perceptions(1, self.ball)
+        self.m = state.make_memory(self.c, 1)
+        self.speech = state.make_speech(1, self.ball)
         self.position = np.tile([-5.0, -12.0], (self.ball + 1, 1))
         self.velocity = np.zeros((self.ball + 1, 2))
         self.yaw = np.zeros(self.ball)
@@ -113,7 +114,7 @@ class Scene:
         """Where the ball is a cycle after a player's command (kind, power, degrees)."""
         kind, power, angle = command
         p = self.index(name)
-        return np.array(tactics.ball_after(self.c, self.s, 0, p, kind, power, math.radians(angle)))
+        return np.array(kicking.ball_after(self.c, self.s, 0, p, kind, power, math.radians(angle)))
 
     def look(self, name: str, *uniforms: float) -> None:
         """Let a player see the truth; `uniforms` are the random numbers that it takes."""

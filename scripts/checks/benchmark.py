@@ -123,7 +123,8 @@ def floor(num_fields: int, cycles: int, num_objects: int = 6) -> float:
 
 def trainer_time(task: str, policy: str, num_fields: int, cycles: int) -> float:
     """CPU microseconds per field-cycle of the trainer, compiled and warmed up before."""
-    from keepaway_agent.training.trainer import Trainer, TrainerConfig
+    from keepaway_agent.training.trainer import Trainer
+    from keepaway_agent.training.trial import TrainerConfig
     from keepaway_sim.task import Task
 
     trainer = Trainer(TrainerConfig(Task.parse(task)), num_fields)
@@ -134,7 +135,7 @@ def trainer_time(task: str, policy: str, num_fields: int, cycles: int) -> float:
 
 def play(trainer: Any, policy: str, num_fields: int, cycles: int) -> tuple[float, int]:
     """CPU seconds and field-cycles of a trial on every field."""
-    from keepaway_agent.training.trainer import StopRule, Trial, trial_seed
+    from keepaway_agent.training.trial import StopRule, Trial, trial_seed
 
     trials = (
         Trial(trial_seed(1, k), StopRule(max_cycles=cycles), policy) for k in range(num_fields)
@@ -146,7 +147,8 @@ def play(trainer: Any, policy: str, num_fields: int, cycles: int) -> tuple[float
 
 def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
     """Where learning's CPU microseconds go, per field-cycle: the parts of a cycle, and the rest."""
-    from keepaway_agent.training.trainer import Trainer, TrainerConfig
+    from keepaway_agent.training.trainer import Trainer
+    from keepaway_agent.training.trial import TrainerConfig
     from keepaway_sim.task import Task
 
     trainer = Trainer(TrainerConfig(Task.parse(task)), num_fields)

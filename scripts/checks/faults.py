@@ -34,7 +34,8 @@ from rclpy.node import Node
 
 from keepaway_agent.learning.weights import load_weights
 from keepaway_msgs.msg import Episode
-from keepaway_sim.bags.writer import BagReader, repair
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.repair import repair
 from keepaway_sim.ros.publishing import ALL, QUEUE
 
 SCRIPTS = Path(__file__).resolve().parents[1]

@@ -23,9 +23,10 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from keepaway_agent.fidelity import measure
+from keepaway_agent.fidelity import measure, reference
 from keepaway_agent.fidelity.figures import draw_durations, draw_learning
-from keepaway_agent.fidelity.measure import Cell, Measured
+from keepaway_agent.fidelity.measure import Measured
+from keepaway_agent.fidelity.reference import Cell
 from keepaway_agent.learning.describe import save
 from keepaway_sim.version import code_version
 
@@ -35,16 +36,16 @@ LEARNING_EPISODES = 3000
 def main() -> int:
     """Play, print, draw."""
     arguments = parse()
-    cells = [cell for cell in measure.reference_cells() if chosen(cell, arguments.only)]
+    cells = [cell for cell in reference.reference_cells() if chosen(cell, arguments.only)]
     if not cells:
         print(f"fidelity: no cell is called {' '.join(arguments.only)}", file=sys.stderr)
         return 1
     if arguments.learning:
-        profiles = [name for name in measure.PROFILES if any(c.profile == name for c in cells)]
+        profiles = [name for name in reference.PROFILES if any(c.profile == name for c in cells)]
         curves = learn(profiles, arguments.seeds, arguments.workers)
         text, numbers, figure, name = learning_report(curves)
     else:
-        recorded = [cell for cell in cells if measure.reference_processes(cell)]
+        recorded = [cell for cell in cells if reference.reference_processes(cell)]
         measured = spread(measure_cell, cells, arguments.episodes, arguments.workers)
         processes = spread(describe, recorded, arguments.episodes // 8, arguments.workers)
         text, numbers = report(measured, dict(zip(recorded, processes, strict=True)))
@@ -158,7 +159,7 @@ def process_table(processes: dict[Cell, dict[str, float]]) -> str:
 
 def reference_statistics(cell: Cell) -> dict[str, float]:
     """What the real server's recordings of a cell give."""
-    recorded = measure.reference_processes(cell)
+    recorded = reference.reference_processes(cell)
     assert recorded is not None
     statistics: dict[str, float] = recorded["statistics"]
     return statistics
@@ -170,11 +171,11 @@ def learning_report(curves: dict[str, np.ndarray]) -> tuple[str, dict[str, Any],
     for profile, ours in curves.items():
         numbers[profile] = {
             "ours_s": ours.tolist(),
-            "reference_s": [curve.tolist() for curve in measure.reference_curves(profile)],
+            "reference_s": [curve.tolist() for curve in reference.reference_curves(profile)],
         }
         mean = [f"{value:.1f}" for value in ours.mean(axis=0)]
         rows.append([profile, f"here, mean of {len(ours)}", *mean])
-        for curve in measure.reference_curves(profile):
+        for curve in reference.reference_curves(profile):
             theirs = [f"{value:.1f}" for value in curve]
             rows.append([profile, "real server", *theirs, *[""] * (len(mean) - len(theirs))])
     blocks = " | ".join(

@@ -12,7 +12,6 @@ import argparse
 import io
 import json
 import math
-import pickle
 import resource
 import signal
 import sys
@@ -28,23 +27,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
-from hypothesis import strategies as st
+from scripts.checks.mutations import broken
 
 from keepaway_agent.actions import Action, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.weights import read_weights, write_weights
 from keepaway_agent.nodes.conversions import read_perception
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, check_config
-from keepaway_sim.bags.match_bag import FieldRecorder, begin_match, world_info
-from keepaway_sim.bags.writer import BagReader, BagWriter
+from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.match.beginning import begin_match
 from keepaway_sim.match.roster import Roster
 from keepaway_sim.nodes.simulator import Settings, read_status
 from keepaway_sim.task import Task
 from keepaway_sim.view.live import LiveMatch
 from keepaway_sim.wire import messages
 from keepaway_sim.wire.cdr import codec
-from keepaway_sim.wire.messages import FieldMessages, Request, action_request
+from keepaway_sim.wire.field_messages import FieldMessages
+from keepaway_sim.wire.messages import Request, action_request
 from keepaway_sim.world.config import Config, profile
 from keepaway_sim.world.world import World
 from keepaway_transfer.errors import LogError, MappingError, StudyError
@@ -57,25 +59,6 @@ from keepaway_transfer.studies.study import load_study
 CASE = Path("fuzz_case.bin")  # where a case that fails is left
 LONGEST = 10.0  # [s] of CPU time that a case may take
 MOST_MEMORY = 2**30  # [bytes] that all cases may take beyond what the program has
-INTERESTING = [
-    *(bytes([value]) * size for value in (0, 1, 127, 128, 255) for size in (1, 4, 8)),
-    *(np.float64(value).tobytes() for value in (math.nan, math.inf, -math.inf, 1e308, -1.0)),
-    *(int(value).to_bytes(8, "little") for value in (2**31, 2**40, 2**63)),
-    *(
-        b"nan",
-        b"inf",
-        b"-1",
-        b"1e999",
-        b"99999999999999999999",
-        b"[]",
-        b"{}",
-        b"null",
-        b'""',
-        b"\n",
-    ),
-    b"../../etc/passwd",
-    pickle.dumps(object),
-]
 
 
 class Target(NamedTuple):
@@ -159,64 +142,6 @@ def fuzz(target: Target, cases: int, number: int) -> Result:
 
 
 # Cases.
-
-
-def broken(valid: list[bytes]) -> st.SearchStrategy[bytes]:
-    """Valid inputs with up to four edits, or any bytes at all."""
-    place = st.integers(0, 2**16)
-    piece = st.sampled_from(INTERESTING) | st.binary(max_size=12)
-    edit = (
-        st.tuples(st.just(flip), place, st.integers(0, 7))
-        | st.tuples(st.just(cut), place, place)
-        | st.tuples(st.just(shorten), place, st.none())
-        | st.tuples(st.just(overwrite), place, piece)
-        | st.tuples(st.just(insert), place, piece)
-        | st.tuples(st.just(repeat), place, place)
-    )
-    edited = st.tuples(st.sampled_from(valid), st.lists(edit, min_size=1, max_size=4)).map(apply)
-    return edited | st.binary(max_size=200)
-
-
-def apply(case: tuple[bytes, list[tuple[Callable[..., bytes], int, Any]]]) -> bytes:
-    """The edited input; places count round and round."""
-    data, edits = case
-    for edit, place, value in edits:
-        data = edit(data, place % (len(data) + 1), value)
-    return data
-
-
-def flip(data: bytes, place: int, bit: int) -> bytes:
-    """One bit the other way."""
-    return (
-        data[:place]
-        + bytes(byte ^ 1 << bit for byte in data[place : place + 1])
-        + data[place + 1 :]
-    )
-
-
-def cut(data: bytes, place: int, size: int) -> bytes:
-    """Some bytes left out."""
-    return data[:place] + data[place + size % 64 :]
-
-
-def shorten(data: bytes, place: int, _: None) -> bytes:
-    """The end left out."""
-    return data[:place]
-
-
-def overwrite(data: bytes, place: int, piece: bytes) -> bytes:
-    """Some bytes replaced."""
-    return data[:place] + piece + data[place + len(piece) :]
-
-
-def insert(data: bytes, place: int, piece: bytes) -> bytes:
-    """Some bytes more."""
-    return data[:place] + piece + data[place:]
-
-
-def repeat(data: bytes, place: int, size: int) -> bytes:
-    """Some bytes twice."""
-    return data[: place + size % 64] + data[place:]
 
 
 # Targets.

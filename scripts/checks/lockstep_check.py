@@ -20,14 +20,8 @@ from typing import Any
 import numpy as np
 
 from keepaway_agent.learning.weights import load_weights
-from keepaway_agent.training.trainer import (
-    StopRule,
-    Trainer,
-    TrainerConfig,
-    Trial,
-    TrialResult,
-    trial_seed,
-)
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialResult, trial_seed
 from keepaway_sim.task import Task
 
 MATCH = Path(__file__).resolve().parents[1] / "match.py"

@@ -20,12 +20,12 @@ from keepaway_agent.nodes.player import Player
 from keepaway_msgs.msg import ActionRequest
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer
 from keepaway_sim.nodes.spectator import Spectator
-from keepaway_sim.view.live import Server
+from keepaway_sim.view.server import Server
 from keepaway_sim.wire.messages import clean_request
 
 ROOT = Path(__file__).resolve().parents[2]

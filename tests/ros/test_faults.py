@@ -11,7 +11,7 @@ import pytest
 from graph import Graph, played, trained
 
 from keepaway_agent.learning.weights import load_weights
-from keepaway_sim.bags.writer import repair
+from keepaway_sim.bags.repair import repair
 from keepaway_sim.errors import KeepawayError
 
 ROOT = Path(__file__).resolve().parents[2]

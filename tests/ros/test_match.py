@@ -14,7 +14,7 @@ import pytest
 from graph import Played, played, trained
 
 from keepaway_agent.learning.weights import load_weights
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
 KEEPERS = ("keeper_1", "keeper_2", "keeper_3")

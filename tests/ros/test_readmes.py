@@ -13,7 +13,7 @@ from recorded import record_match
 
 from keepaway_agent.actions import Role
 from keepaway_agent.nodes.player import Player
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer

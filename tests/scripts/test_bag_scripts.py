@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
 

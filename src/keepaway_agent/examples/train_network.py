@@ -17,7 +17,8 @@ import numpy as np
 from small_network import QNetworks
 
 from keepaway_agent.environments.gym import KeeperVectorEnv
-from keepaway_agent.training.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
 
 CYCLES_PER_HOUR = 36_000

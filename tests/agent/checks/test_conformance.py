@@ -17,12 +17,9 @@ from keepaway_agent.checks.conformance import (
     Pause,
     Request,
     Shown,
-    answer_times,
-    is_legal,
-    judge,
-    report,
     script,
 )
+from keepaway_agent.checks.judge import answer_times, is_legal, judge, report
 from keepaway_agent.errors import AgentError
 
 

@@ -13,8 +13,9 @@ from keepaway_agent.checks.decisions import check_decisions, recorded_agents
 from keepaway_agent.learning.weights import write_weights
 from keepaway_agent.playing.agent import Agent
 from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.verify import check_world
-from keepaway_sim.bags.writer import BagReader, BagWriter
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.messages import ACTION_REQUEST, action_request, read_request
 

@@ -6,9 +6,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import api_test, seed_test
 
-from keepaway_agent.environments.gym import KeeperEnv, KeepersAECEnv, KeeperVectorEnv
+from keepaway_agent.environments.aec import KeepersAECEnv
+from keepaway_agent.environments.gym import KeeperEnv, KeeperVectorEnv
 from keepaway_agent.errors import AgentError
-from keepaway_agent.training.trainer import StopRule, Trainer, TrainerConfig, Trial, trial_seed
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
 
 

@@ -11,14 +11,8 @@ from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.sarsa import SarsaConfig, tiles_of
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
-from keepaway_agent.training.trainer import (
-    StopRule,
-    Trainer,
-    TrainerConfig,
-    Trial,
-    TrialResult,
-    trial_seed,
-)
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialResult, trial_seed
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.world import World

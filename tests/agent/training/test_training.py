@@ -16,8 +16,10 @@ import pytest
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.weights import load_weights
-from keepaway_agent.training.trainer import Progress
-from keepaway_agent.training.training import Training, TrainingFolder, play
+from keepaway_agent.training.folder import TrainingFolder
+from keepaway_agent.training.training import Training
+from keepaway_agent.training.trial import Progress
+from keepaway_agent.training.workers import play
 from keepaway_sim.errors import KeepawayError
 
 SCRIPT = Path(__file__).parents[3] / "scripts/train.py"

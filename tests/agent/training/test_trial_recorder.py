@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from keepaway_agent.checks.decisions import check_decisions
-from keepaway_agent.training.trainer import TrialResult
-from keepaway_agent.training.training import Training, TrainingFolder, play
+from keepaway_agent.training.folder import TrainingFolder
+from keepaway_agent.training.training import Training
+from keepaway_agent.training.trial import TrialResult
+from keepaway_agent.training.workers import play
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.verify import check_world

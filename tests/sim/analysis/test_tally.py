@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from keepaway_sim.analysis.tally import Analyst, EpisodeRow, analyse, episode_table
+from keepaway_sim.analysis.report import analyse
+from keepaway_sim.analysis.tally import Analyst, EpisodeRow, episode_table
 from keepaway_sim.bags.match_bag import MatchBag, Track
-from keepaway_sim.bags.writer import BagReader, BagWriter, is_bag
+from keepaway_sim.bags.reader import BagReader, is_bag
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.task import Action
 
 

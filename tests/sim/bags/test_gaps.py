@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from keepaway_sim.bags.gaps import GapCounter
-from keepaway_sim.bags.writer import BagReader, Recorded
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.topics import Recorded
 from keepaway_sim.wire.messages import ACTION_REQUEST, PERCEPTION
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 
 PACKAGES = (
     "@mcap/core@2.2.2",

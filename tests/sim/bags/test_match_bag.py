@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from recorded import in_play, simple_requests
 
+from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
 from keepaway_sim.bags.gaps import GapCounter
-from keepaway_sim.bags.match_bag import FieldRecorder, MatchBag, world_info
-from keepaway_sim.bags.writer import BagReader, BagWriter
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.wire.messages import ACTION_REQUEST, FIELD_STATE, MATCH, PERCEPTION

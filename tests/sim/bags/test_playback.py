@@ -8,7 +8,7 @@ import pytest
 
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.playback import Playback, episode_times
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.messages import PERCEPTION
 

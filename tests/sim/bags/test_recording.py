@@ -19,7 +19,10 @@ from recorded import record_match
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
-from keepaway_sim.bags.writer import BagReader, BagWriter, Qos, Recorded, repair
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.repair import repair
+from keepaway_sim.bags.topics import Qos, Recorded
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.messages import (

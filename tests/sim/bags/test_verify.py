@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.verify import check_world
-from keepaway_sim.bags.writer import BagReader, BagWriter
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.messages import FIELD_STATE, PERCEPTION

@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Episode, FieldState, Match
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros import publishing
 from keepaway_sim.ros.inbox import Inbox

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from keepaway_sim.bags.match_bag import MatchBag, with_markers
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.marked import with_markers
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.wire.messages import MARKERS
 
 LAYOUT = Path(__file__).resolve().parents[3] / "src/keepaway_sim/foxglove/keepaway.json"

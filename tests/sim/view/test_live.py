@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.view import live
-from keepaway_sim.view.live import Event, LiveMatch, Server
+from keepaway_sim.view import server as serving
+from keepaway_sim.view.live import Event, LiveMatch
 from keepaway_sim.view.page import encoded, frames
+from keepaway_sim.view.server import Server
 from keepaway_sim.wire.messages import MATCH
 
 
@@ -151,9 +153,9 @@ def test_a_browser_that_does_not_read_costs_nothing(server: Server, bag_3v2: Pat
         for _ in range(3):
             server.match.feed(message.message_type, message.data)
         assert events.qsize() == 1
-        for _ in range(2 * live.QUEUE_SIZE):
+        for _ in range(2 * serving.QUEUE_SIZE):
             server._broadcast(("frame", "[]"))
-        assert events.qsize() == live.QUEUE_SIZE
+        assert events.qsize() == serving.QUEUE_SIZE
 
 
 @pytest.mark.skipif(chromium.find() is None, reason=chromium.INSTALL)

@@ -10,7 +10,8 @@ import pytest
 from matplotlib.patches import Circle
 
 from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track
-from keepaway_sim.bags.writer import BagReader, BagWriter
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.view.page import (
@@ -20,9 +21,9 @@ from keepaway_sim.view.page import (
     layout,
     match_data,
     page,
-    picture,
     replay_page,
 )
+from keepaway_sim.view.picture import picture
 
 
 @pytest.fixture(scope="module")

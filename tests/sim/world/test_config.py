@@ -9,7 +9,8 @@ import pytest
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
-from keepaway_sim.world.config import CYCLE_TIME, PROFILES, Config, noiseless, pack, profile
+from keepaway_sim.world.config import CYCLE_TIME, PROFILES, Config, noiseless, profile
+from keepaway_sim.world.constants import pack
 
 approx = pytest.approx
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scenes import EXACT, Scene
 
-from keepaway_sim.world import sight
+from keepaway_sim.world import hearing, memory, sight
 from keepaway_sim.world.config import NEVER, noiseless, profile
+from keepaway_sim.world.state import KICK
 
 approx = pytest.approx
 
@@ -227,7 +228,7 @@ def test_what_is_not_seen_rolls_on_and_ages():
     scene.move("2", 0.4, 0.0)
     scene.move("o", 1.0, -0.5)
     scene.s.age[0, 0, 1] = 3
-    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    memory.remember(scene.c, scene.s, scene.m, 0, 0)
     s = scene.s
     assert s.position[0, 0, 1] == approx([1.4, 0.0])
     assert s.velocity[0, 0, 1] == approx([0.16, 0.0])  # player_decay 0.4
@@ -239,7 +240,7 @@ def test_what_is_not_seen_rolls_on_and_ages():
 def test_the_opponent_nearest_to_the_ball_is_believed_to_come_for_it():
     scene = Scene("a . . . 1 . . . o . . . . . b")  # a is 8 m, b 6 m from the ball
     scene.move("a", 0.4, 0.0)
-    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    memory.remember(scene.c, scene.s, scene.m, 0, 0)
     assert scene.seen("1", "b") == approx([10.0 - 0.3, 0.0])
     assert scene.seen("1", "a") == approx([-4.0 + 0.4, 0.0])
 
@@ -248,9 +249,9 @@ def test_an_own_kick_is_part_of_what_is_expected():
     scene = Scene("1 o")
     scene.put("o", 0.385, 0.0)
     scene.move("o", 0.3, 0.0)
-    scene.m.command[0, 0] = sight.KICK, 50.0, math.pi / 2
+    scene.m.command[0, 0] = KICK, 50.0, math.pi / 2
     scene.m.kicked[0, 0] = True
-    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    memory.remember(scene.c, scene.s, scene.m, 0, 0)
     # 50 * 0.027 = 1.35 to the left
     assert scene.seen("1", "o") == approx([0.685, 1.35])
     assert scene.s.velocity[0, 0, scene.ball] == approx([0.94 * 0.3, 0.94 * 1.35])
@@ -259,14 +260,14 @@ def test_an_own_kick_is_part_of_what_is_expected():
 def test_an_own_turn_is_part_of_what_is_expected():
     scene = Scene("1 o")
     scene.m.turned[0, 0] = math.radians(30.0)
-    sight.remember(scene.c, scene.s, scene.m, 0, 0)
+    memory.remember(scene.c, scene.s, scene.m, 0, 0)
     assert math.degrees(scene.s.body[0, 0, 0]) == approx(30.0)
 
 
 def test_own_speed_is_felt_to_a_hundredth():
     scene = Scene("1 . . o", ROUNDED)
     scene.velocity[0] = 0.3 * 0.777, 0.4 * 0.777  # speed 0.3885
-    sight.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
+    memory.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
     assert scene.s.velocity[0, 0, 0] == approx([0.6 * 0.39, 0.8 * 0.39])
     assert scene.s.age[0, 0, 0] == 0
 
@@ -278,7 +279,7 @@ def test_whoever_runs_into_the_ball_believes_it_before_its_body():
     scene.s.velocity[0, 0, scene.ball] = -0.5, 0.0
     scene.s.velocity[0, 0, 0] = 0.9, 0.0  # expected now: 0.36; felt: reversed and slow
     scene.velocity[0] = -0.05, 0.0
-    sight.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
+    memory.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
     assert scene.seen("1", "o") == approx([0.2, 0.0])
     assert scene.s.velocity[0, 0, scene.ball] == approx([0.05, 0.0])
 
@@ -287,7 +288,7 @@ def test_a_new_episode_forgets_the_last():
     scene = Scene(WIDE)
     scene.move("o", 1.0, 0.0)
     uniforms, cursor = np.array([[0.7]]), np.zeros(1, dtype=np.int64)
-    sight.forget(scene.c, scene.s, scene.m, 0, 0, uniforms, cursor)
+    memory.forget(scene.c, scene.s, scene.m, 0, 0, uniforms, cursor)
     assert np.all(scene.s.age[0, 0] == NEVER)
     assert not scene.s.velocity[0, 0].any()
     assert scene.m.look_phase[0, 0] == 2  # 0.7 * 3
@@ -301,13 +302,13 @@ HEARD = """
 
 
 def say(scene: Scene, name: str) -> None:
-    sight.speak(scene.c, scene.s, scene.speech, scene.m, 0, scene.index(name), False)
+    hearing.speak(scene.c, scene.s, scene.speech, scene.m, 0, scene.index(name), False)
 
 
 def hear(scene: Scene, name: str, uniform: float) -> None:
     """Let a player hear the team-mate that this random number chooses."""
     block, cursor = np.array([[uniform]]), np.zeros(1, dtype=np.int64)
-    sight.hear(scene.c, scene.s, scene.speech, 0, scene.index(name), block, cursor)
+    hearing.hear(scene.c, scene.s, scene.speech, 0, scene.index(name), block, cursor)
 
 
 def test_a_player_speaks_of_the_ball_and_of_an_opponent_near_it():

@@ -11,7 +11,9 @@ import pytest
 
 from keepaway_sim.task import Task
 from keepaway_sim.world import physics
-from keepaway_sim.world.config import pack, profile
+from keepaway_sim.world.bodies import Bodies
+from keepaway_sim.world.config import profile
+from keepaway_sim.world.constants import pack
 
 approx = pytest.approx
 
@@ -212,7 +214,7 @@ def test_velocities_lie_on_a_grid():
 
 def test_bodies_move_by_their_velocity_exactly_wherever_their_field_lies():
     radius = np.array([0.3, 0.3, 0.085])
-    bodies = physics.Bodies(40, radius, 25.0)
+    bodies = Bodies(40, radius, 25.0)
     here = np.round(np.array([(1 / 3, -2 / 7), (4.1, 0.0), (-9.9, 3.3)]) * 2**30) / 2**30
     step = np.round(np.array([(0.7, 1 / 9), (-1.0, 0.2), (2.1, -1.7)]) * 2**30) / 2**30
     bodies.motion[:, :, :2] = here + bodies.place[:, None, :]
@@ -224,7 +226,7 @@ def test_bodies_move_by_their_velocity_exactly_wherever_their_field_lies():
 
 
 def test_only_fields_in_which_discs_touch_are_named():
-    bodies = physics.Bodies(20, np.array([0.3, 0.3, 0.085]), 25.0)
+    bodies = Bodies(20, np.array([0.3, 0.3, 0.085]), 25.0)
     bodies.motion[:, :, :2] = bodies.place[:, None, :] + np.array([(0, 0), (4, 0), (8, 0)])
     bodies.motion[7, 1, :2] = bodies.place[7] + (0.5, 0.0)
     bodies.motion[13, 2, 2:] = (-3.8, 0.0)  # a ball that rolls against a player

@@ -7,7 +7,8 @@ import pytest
 
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.world import referee
-from keepaway_sim.world.config import pack, profile
+from keepaway_sim.world.config import profile
+from keepaway_sim.world.constants import pack
 
 approx = pytest.approx
 

@@ -7,9 +7,11 @@ import pytest
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Outcome, Task
-from keepaway_sim.world.config import NEVER, Config, noiseless, pack, profile
+from keepaway_sim.world.config import NEVER, Config, noiseless, profile
+from keepaway_sim.world.constants import pack
+from keepaway_sim.world.cycle import is_legal
 from keepaway_sim.world.physics import GRID
-from keepaway_sim.world.world import World, is_legal
+from keepaway_sim.world.world import World
 
 approx = pytest.approx
 HOLD, PASS, OPEN, GO, MARK = (int(action) for action in Action)

@@ -1,1 +1,1 @@
-"""ROOM."""
+"""Does an agent keep to the contract, and would it decide the same again?"""

@@ -1,1 +1,1 @@
-"""ROOM."""
+"""This world beside the real soccer server: hold times, trajectories, learning curves."""

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from keepaway_agent.fidelity.measure import BLOCK, Measured, reference_curves, reference_processes
+from keepaway_agent.fidelity.measure import BLOCK, Measured
+from keepaway_agent.fidelity.reference import reference_curves, reference_processes
 from keepaway_sim.world.config import CYCLE_TIME
 
 COLOURS: Final = {"random": "#0072b2", "hold": "#d55e00", "hand": "#009e73"}

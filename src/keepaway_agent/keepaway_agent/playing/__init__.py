@@ -1,1 +1,1 @@
-"""ROOM."""
+"""Policies, and one player as an object. Knows no simulator."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from keepaway_agent.training.trainer import Moment
-from keepaway_sim.bags.match_bag import FieldRecorder, world_info
+from keepaway_agent.training.trial import Moment
+from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
 from keepaway_sim.bags.writer import BagWriter
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from keepaway_sim.bags.writer import BagReader
+from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.wire.messages import (
     ACTION_REQUEST,
     CYCLE_NS,

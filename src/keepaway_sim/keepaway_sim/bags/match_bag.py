@@ -6,128 +6,22 @@ Topics are found by their types, so a match may have been recorded in any namesp
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from keepaway_sim.bags.writer import BagReader, BagWriter, Batch
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.topics import Batch
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
-from keepaway_sim.version import code_version
-from keepaway_sim.wire import messages
 from keepaway_sim.wire.messages import (
-    ACTION_REQUEST,
-    CLOCK,
     CYCLE_NS,
-    EPISODE,
-    FIELD_STATE,
     MATCH,
-    PERCEPTION,
     SECOND,
-    FieldMessages,
-    Request,
 )
 from keepaway_sim.world.config import CYCLE_TIME, NEVER, Config
-from keepaway_sim.world.world import World
-
-
-class FieldRecorder:
-    """Records one field of a World while it is played: the messages a simulator node would say.
-
-    Call `moment` once after `World.start`, then `requests` before and `moment` after each
-    `World.step`:
-
-        with BagWriter(path, world_info(world, seed)) as bag:
-            recorder = FieldRecorder(bag, world, field, seed, wanted={0, 500}.__contains__)
-            recorder.moment()
-            while ...:
-                recorder.requests(action[field], target[field])
-                world.step(action, target)
-                recorder.moment()
-    """
-
-    def __init__(
-        self,
-        bag: BagWriter,
-        world: World,
-        field: int,
-        seed: int,
-        wanted: Callable[[int], bool] = lambda number: True,
-    ) -> None:
-        """Say what is played.
-
-        Args:
-            bag: where to.
-            world, field: which field of which world.
-            seed: of the match.
-            wanted: which episodes to record, by number.
-        """
-        self._bag, self._world, self._field, self._seed = bag, world, field, seed
-        self._say = FieldMessages(world, field)
-        self._wanted = wanted
-        self._names = world.task.player_names
-        self._write("match", MATCH, self._say.match(seed, speed=0.0))
-
-    def moment(self) -> None:
-        """Record the truth and what every player perceives of it."""
-        number = int(self._world.perceptions.episode[self._field])
-        if not self._wanted(number):
-            return
-        self._write("clock", CLOCK, self._say.clock())
-        self._write("field_state", FIELD_STATE, self._say.field_state())
-        for name, data in zip(self._names, self._say.perceptions(), strict=True):
-            self._write(f"{name}/perception", PERCEPTION, data)
-        if self._world.perceptions.outcome[self._field] != Outcome.IN_PLAY:
-            self._write("episode", EPISODE, self._say.episode(self._seed))
-
-    def requests(self, action: np.ndarray, target: np.ndarray, action_values: Any = None) -> None:
-        """Record what the players are about to do, where a decision is due.
-
-        Args:
-            action, target: (num_players,) int.
-            action_values: for every player the values its learner saw, or an empty sequence.
-        """
-        seen, field = self._world.perceptions, self._field
-        number, cycle = int(seen.episode[field]), int(seen.cycle[field])
-        if not self._wanted(number):
-            return
-        for player in np.flatnonzero(seen.decision_due[field]).tolist():
-            asked = Request(player, number, cycle, int(action[player]), int(target[player]))
-            values = () if action_values is None else action_values[player]
-            data = messages.action_request(asked, values)
-            self._write(f"{self._names[player]}/action_request", ACTION_REQUEST, data)
-
-    def _write(self, topic: str, message_type: str, data: bytes) -> None:
-        self._bag.write(f"/{topic}", message_type, data, self._say.stamp_ns())
-
-
-WORLD_KEY = (0, 0)
-"""The spawn key of the world's seed in a match of nodes: trial 0; second, 1 is the players'."""
-
-
-def begin_match(world: World, seed: int, first_episode: int = 0) -> None:
-    """Kick off a match of nodes: field 0 of a world plays from `first_episode` on.
-
-    A match that goes on after its simulator died has random numbers of its own: they follow from
-    the seed and the number of the episode that it goes on with.
-    """
-    key = (*WORLD_KEY, first_episode) if first_episode else WORLD_KEY
-    world.start(0, np.random.SeedSequence(seed, spawn_key=key))
-    world.perceptions.episode[0] = first_episode
-
-
-def world_info(world: World, seed: int, **more: str) -> dict[str, str]:
-    """What a bag says of the world that made it."""
-    return {
-        "task": world.task.name,
-        "field": world.task.field,
-        "profile": world.config.profile,
-        "seed": str(seed),
-        "code_version": code_version(),
-        **more,
-    }
 
 
 class EpisodeSummary(NamedTuple):
@@ -140,32 +34,6 @@ class EpisodeSummary(NamedTuple):
     duration: float  # [s]
     outcome: Outcome
     lost_by: int  # player index; -1 nobody
-
-
-def with_markers(path: Path | str, output: Path | str) -> BagReader:
-    """Write a copy of a match's bag in which /markers show every cycle, for Foxglove and RViz.
-
-    Raises:
-        KeepawayError: no bag of a match, or the output exists.
-    """
-    match = MatchBag(path)
-    reader, states, markers = match.reader, match.topic("field_state"), match.topic("markers")
-    decode = reader.codec(states).decode
-    with BagWriter(output, reader.info) as bag:
-        for name, data in reader.attachments():
-            bag.attach(name, data)
-        for topic in reader.topics.values():
-            bag.add_topic(*topic[:2], topic.qos, topic.definition, topic.type_hash)
-        for message in reader.messages(reader.topics.keys() - {markers}):
-            bag.write(message.topic, message.message_type, message.data, message.log_time)
-            if message.topic == states:
-                state = decode(message.data)
-                position = np.array(state["positions"]).reshape(-1, 2)
-                shown = messages.marker_array(
-                    match.task, position, np.array(state["yaws"]), message.log_time
-                )
-                bag.write(markers, messages.MARKERS, shown, message.log_time)
-    return BagReader(output)
 
 
 def episode_summaries(batch: Batch) -> Iterator[EpisodeSummary]:

@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.bags.writer import BagReader, Recorded
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.topics import Recorded
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.messages import SECOND
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track, begin_match
+from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.match.beginning import begin_match
 from keepaway_sim.task import Outcome
 from keepaway_sim.world.world import World
 

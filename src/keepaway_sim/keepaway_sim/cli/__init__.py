@@ -1,1 +1,1 @@
-"""ROOM."""
+"""Command lines and processes of the scripts."""

@@ -1,1 +1,1 @@
-"""ROOM."""
+"""Who plays, how a match begins and goes on. Knows no ROS."""

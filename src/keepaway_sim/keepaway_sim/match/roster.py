@@ -18,8 +18,10 @@ import numpy as np
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Role, Task
 from keepaway_sim.wire.messages import Request, read_request
-from keepaway_sim.world.config import Config, pack
-from keepaway_sim.world.world import World, is_legal
+from keepaway_sim.world.config import Config
+from keepaway_sim.world.constants import pack
+from keepaway_sim.world.cycle import is_legal
+from keepaway_sim.world.world import World
 
 MAX_ACTION_VALUES = 64
 """More than any learner chooses from; a longer message is not an answer."""

@@ -23,7 +23,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from keepaway_sim.bags.gaps import GapCounter
-from keepaway_sim.bags.writer import BagWriter, default_qos
+from keepaway_sim.bags.topics import default_qos
+from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.subscribing import declared, listen, offered_qos, take_all, to_profile
 from keepaway_sim.version import code_version

@@ -22,7 +22,8 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 from keepaway_sim.bags.playback import Playback, episode_times
-from keepaway_sim.bags.writer import BagReader, Recorded
+from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.topics import Recorded
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.subscribing import declared, message_class, to_profile
 from keepaway_sim.wire.messages import SECOND

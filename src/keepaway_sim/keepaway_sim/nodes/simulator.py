@@ -32,9 +32,10 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from keepaway_msgs.msg import ActionRequest, AgentStatus
-from keepaway_sim.bags.match_bag import begin_match, world_info
+from keepaway_sim.bags.field_recorder import world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.match.beginning import begin_match
 from keepaway_sim.match.roster import Roster
 from keepaway_sim.ros.diagnostics import diagnostics
 from keepaway_sim.ros.inbox import PROCESS_SIZE, Inbox
@@ -43,7 +44,7 @@ from keepaway_sim.ros.subscribing import declared
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.wire import messages
 from keepaway_sim.wire.cdr import codec
-from keepaway_sim.wire.messages import FieldMessages
+from keepaway_sim.wire.field_messages import FieldMessages
 from keepaway_sim.world.config import CYCLE_TIME, PROFILES, Config, profile
 from keepaway_sim.world.world import World
 

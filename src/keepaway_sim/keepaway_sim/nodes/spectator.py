@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from keepaway_sim.bags.writer import Qos
+from keepaway_sim.bags.topics import Qos
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.subscribing import listen, take_all, to_profile
 from keepaway_sim.view.live import LiveMatch

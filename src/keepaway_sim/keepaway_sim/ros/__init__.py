@@ -1,1 +1,1 @@
-"""ROOM."""
+"""What the nodes share of rclpy: publishing, subscribing, diagnostics."""

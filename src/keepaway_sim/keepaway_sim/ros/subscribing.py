@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from keepaway_sim.bags.writer import Qos
+from keepaway_sim.bags.topics import Qos
 from keepaway_sim.errors import KeepawayError
 
 Settings = TypeVar("Settings")

@@ -1,1 +1,1 @@
-"""ROOM."""
+"""The soccer server's world: physics, referee, perception and skills of many fields."""

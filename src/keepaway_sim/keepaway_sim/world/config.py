@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.task import MAX_FIELD_SIDE, Task
+from keepaway_sim.task import MAX_FIELD_SIDE
 
 CYCLE_TIME = 0.1  # [s] S: simulator_step
 ROLL_CYCLES = 128  # entries of the two tables of rolling distances
@@ -223,15 +220,6 @@ def noiseless(config: Config) -> Config:
 
 
 _EVERYWHERE = 2.0 * MAX_FIELD_SIDE  # [m] longer than any field's diagonal
-_GROUPS = (Task, Physics, Vision, Skills)
-_DEGREES = (
-    "visible_angle",
-    "direction_step",
-    "self_yaw_error",
-    "when_to_turn",
-    "mark_turn_angle",
-    "search_turn",
-)
 _DIVISORS = (
     "player_speed_max",
     "dash_power_rate",
@@ -240,78 +228,6 @@ _DIVISORS = (
     "kickable_margin",
     "pass_end_speed",
 )
-_DERIVED = (
-    "kickable_distance",  # [m] between centres
-    "touch_distance",  # [m] between centres
-    "full_dash",  # [m/cycle^2] acceleration at full power
-    "top_speed",  # [m/cycle] of a player who keeps dashing
-    "ball_roll",  # (ROLL_CYCLES,) see `_roll_table`
-    "player_roll",
-    "sight_edge",  # [m] where reported distances change, see `_sight_tables`
-    "sight_value",  # [m] the reported distance below each edge
-    "sight_first",  # the first edge beyond each whole multiple of 1 / SIGHT_CELLS m
-    "direction_cosine",  # of every direction that is seen, from -pi to pi
-    "direction_sine",
-)
-
-# Made once, under its own name in this module: numba's cache on disk must find it again.
-Constants: Any = namedtuple(  # type: ignore[misc]
-    "Constants",
-    [entry.name for group in _GROUPS for entry in dataclasses.fields(group)] + list(_DERIVED),
-)
-
-
-def pack(task: Task, config: Config) -> Any:
-    """All constants as one named tuple that compiled functions take (angles in radians)."""
-    values: dict[str, Any] = {}
-    for group in (task, config.physics, config.vision, config.skills):
-        for entry in dataclasses.fields(group):
-            kind: Any = type(entry.default)  # one type per name, so that code is compiled once
-            values[entry.name] = kind(getattr(group, entry.name))
-    for name in _DEGREES:
-        values[name] = math.radians(values[name])
-    physics = config.physics
-    values["touch_distance"] = physics.player_size + physics.ball_size
-    values["kickable_distance"] = values["touch_distance"] + physics.kickable_margin
-    values["full_dash"] = 100.0 * physics.dash_power_rate
-    values["top_speed"] = min(
-        values["full_dash"] / (1.0 - physics.player_decay), physics.player_speed_max
-    )
-    values |= _sight_tables(config.vision.quantize_step)
-    values |= _direction_tables(values["direction_step"])
-    values["ball_roll"] = _roll_table(physics.ball_decay)
-    values["player_roll"] = _roll_table(physics.player_decay)
-    return Constants(**values)
-
-
-def _roll_table(decay: float) -> np.ndarray:
-    """(ROLL_CYCLES,) distance over first speed of what rolls for 0, 1, .. cycles."""
-    return (1.0 - decay ** np.arange(ROLL_CYCLES)) / (1.0 - decay)
-
-
-def _sight_tables(step: float) -> dict[str, np.ndarray]:
-    """Tables of the distances that players see.
-
-    S visualsenderplayer.cpp `calcQuantDist`: the logarithm is rounded to `step`, then what comes
-    of it to 0.1 m. So the reported distance changes where logarithms lie half a step between.
-    """
-    step = step or 1.0  # exact distances need no tables
-    first, last = math.log(SIGHT_NEAREST) // step, math.log(SIGHT_FARTHEST) // step
-    steps = np.arange(first, last + 1) * step
-    edge = np.append(np.exp(steps[:-1] + 0.5 * step), math.inf)
-    cells = np.arange(int(SIGHT_FARTHEST * SIGHT_CELLS)) / SIGHT_CELLS
-    return {
-        "sight_edge": edge,
-        "sight_value": np.round(np.exp(steps) / SIGHT_STEP) * SIGHT_STEP,
-        "sight_first": np.searchsorted(edge, cells, side="right"),
-    }
-
-
-def _direction_tables(step: float) -> dict[str, np.ndarray]:
-    """Cosines and sines of the directions that players see, multiples of `step` [rad]."""
-    most = math.ceil(math.pi / step) if step > 0.0 else 0
-    direction = step * np.arange(-most, most + 1)
-    return {"direction_cosine": np.cos(direction), "direction_sine": np.sin(direction)}
 
 
 def _check_numbers(group: object) -> None:

@@ -1,1 +1,1 @@
-"""ROOM."""
+"""A study's results for people: metrics, statistics, tables, figures."""

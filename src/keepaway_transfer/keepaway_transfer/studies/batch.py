@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from keepaway_agent.actions import Role
-from keepaway_agent.training.trainer import StopRule, Trainer, TrainerConfig, TrialResult
-from keepaway_agent.training.trainer import Trial as Run
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, TrialResult
+from keepaway_agent.training.trial import Trial as Run
 from keepaway_sim.version import code_version
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer.reports.metrics import SECONDS_PER_HOUR

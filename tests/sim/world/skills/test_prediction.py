@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from keepaway_sim.task import Task
-from keepaway_sim.world.config import NEVER, pack, profile
+from keepaway_sim.world.config import NEVER, profile
+from keepaway_sim.world.constants import pack
 from keepaway_sim.world.skills import prediction
 
 approx = pytest.approx

@@ -10,8 +10,8 @@ import pytest
 from scenes import Scene
 
 from keepaway_sim.task import Action
-from keepaway_sim.world.sight import DASH, KICK, TURN
-from keepaway_sim.world.skills import tactics
+from keepaway_sim.world.skills import kicking, running, tactics
+from keepaway_sim.world.state import DASH, KICK, TURN
 
 approx = pytest.approx
 
@@ -97,7 +97,7 @@ def test_whoever_cannot_kick_goes_to_the_ball_instead():
 )
 def test_a_pass_arrives_at_its_end_speed(distance, cycles):
     c = Scene("1 2").c
-    assert tactics.pass_speed(c, distance, 1.2) == approx(1.2 / 0.94**cycles)
+    assert kicking.pass_speed(c, distance, 1.2) == approx(1.2 / 0.94**cycles)
 
 
 def test_a_pass_is_kicked_at_once_where_power_suffices():
@@ -370,7 +370,7 @@ def test_commands_are_cut_to_whole_numbers():
 @pytest.mark.parametrize(("name", "direction"), [("1", 0.0), ("a", 180.0)])
 def test_keepers_play_to_the_right_and_takers_to_the_left(name, direction):
     scene = Scene("1 a")
-    assert math.degrees(tactics.direction_of_play(scene.c, scene.index(name))) == direction
+    assert math.degrees(running.direction_of_play(scene.c, scene.index(name))) == direction
 
 
 def test_a_neck_is_turned_only_where_the_view_is_limited():

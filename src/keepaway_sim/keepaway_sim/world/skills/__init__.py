@@ -1,1 +1,1 @@
-"""ROOM."""
+"""A requested high-level action made into this cycle's dash, turn or kick."""

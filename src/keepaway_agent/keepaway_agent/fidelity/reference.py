@@ -1,0 +1,77 @@
+"""Measurements of the real soccer server, as cells to compare with."""
+
+from __future__ import annotations
+
+import importlib.resources
+import json
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+PROFILES: Final = {"2005": "E05", "v19": "D19"}
+"""Our profiles, and their names in the reference."""
+
+
+POLICIES: Final = ("random", "hold", "hand")
+TASKS: Final = ("3v2", "4v3")
+GOALS: Final = {"random": 0.10, "hold": 0.10, "hand": 0.25}
+"""How far our mean may be off at 360 degrees."""
+
+
+GOAL_NARROW: Final = 0.20  # the same at 90 degrees
+GOAL_OUT: Final = 0.10  # how far the share of episodes that end out of bounds may be off
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One measurement of the reference, in seconds."""
+
+    profile: str
+    visible_angle: int  # [deg]
+    task: str
+    policy: str
+    mean: float
+    sem: float
+    std: float | None = None
+    out: float | None = None  # share that ended out of bounds
+    n: int | None = None  # episodes
+
+    @property
+    def goal(self) -> float:
+        """The share by which our mean may be off."""
+        return GOALS[self.policy] if self.visible_angle == 360 else GOAL_NARROW
+
+
+def reference(name: str) -> dict[str, Any]:
+    """A file of the reference measurements, `hold_times` or `process_statistics`."""
+    folder = importlib.resources.files("keepaway_sim") / "reference"
+    data: dict[str, Any] = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    return data
+
+
+def reference_cells() -> list[Cell]:
+    """All measurements of hold times."""
+    times = reference("hold_times")
+    return [
+        Cell(profile, angle, task, policy, **numbers)
+        for profile, name in PROFILES.items()
+        for angle in (360, 90)
+        for task, policies in times[name].get(f"visible_angle_{angle}", {}).items()
+        for policy, numbers in policies.items()
+    ]
+
+
+def reference_curves(profile: str) -> list[np.ndarray]:
+    """Learning curves of the reference on 3v2: means of successive blocks of BLOCK episodes [s]."""
+    curves = reference("hold_times")[PROFILES[profile]]["learning_3v2_per_200_episodes"]
+    return [np.array(curve) for curve in (curves if isinstance(curves[0], list) else [curves])]
+
+
+def reference_processes(cell: Cell) -> dict[str, Any] | None:
+    """`episodes`, `cycles` of each and mean `statistics` of recorded play; None: not recorded."""
+    recorded = reference("process_statistics")["recorded"].get(PROFILES[cell.profile], {})
+    if cell.visible_angle != 360:
+        return None
+    found: dict[str, Any] | None = recorded.get(cell.task, {}).get(cell.policy)
+    return found

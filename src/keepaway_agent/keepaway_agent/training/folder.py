@@ -1,0 +1,176 @@
+"""The folder of a training's results: a trial appears in it whole or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from keepaway_agent.actions import Outcome, Role
+from keepaway_agent.errors import AgentError
+from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
+from keepaway_agent.training.training import Training
+from keepaway_agent.training.trial import TrialResult
+from keepaway_sim.version import code_version
+
+FORMAT: Final = "keepaway-training"
+FORMAT_VERSION: Final = 1
+
+
+class TrainingFolder:
+    """A training's results on the disk.
+
+    Attributes:
+        path: the folder.
+        done: numbers of the trials that are there.
+    """
+
+    def __init__(
+        self, path: Path, training: Training, command: str = "", any_code: bool = False
+    ) -> None:
+        """Begin a folder, or go on with the one that is there.
+
+        Args:
+            path: where; made if it is missing.
+            training: whose results it holds.
+            command: that makes them, for the record.
+            any_code: go on also if another version of the code began it.
+
+        Raises:
+            AgentError: a folder of something else, or of other settings or another version.
+        """
+        self.path, self._training, self._command = path, training, command
+        settings = json.loads(json.dumps(dataclasses.asdict(training)))
+        self._record = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "settings": settings,
+            "code_version": code_version(),
+            "command": command,
+        }
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            if (path / "training.json").exists():
+                _check_same(path, self._record, any_code)
+            elif any(path.iterdir()):
+                raise AgentError(f"{path} holds something else: name another folder")
+            else:
+                _write_whole(path / "training.json", json.dumps(self._record, indent=1))
+        except OSError as error:
+            raise AgentError(f"{path} cannot be used: {error}") from error
+        self.done = sorted(int(trial.name[6:]) for trial in path.glob("trial_[0-9]*"))
+
+    def save(self, result: TrialResult) -> None:
+        """Put a finished trial into the folder, whole or not at all.
+
+        Raises:
+            AgentError: it cannot be written.
+        """
+        number = int(result.trial.label)
+        beside = self.path / f".trial_{number:04}.{os.getpid()}.tmp"
+        try:
+            shutil.rmtree(beside, ignore_errors=True)
+            beside.mkdir()
+            _write_whole(beside / "episodes.csv", _episodes_text(result))
+            for weights in self._learned(result):
+                save_weights(beside / f"{weights.player}.npz", weights)
+                if number == 0:
+                    save_weights(self.path / f"{weights.player}.npz", weights, overwrite=True)
+            beside.rename(self._folder(number))
+        except OSError as error:
+            raise AgentError(f"trial {number} cannot be written: {error}") from error
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
+        self.done = sorted([*self.done, number])
+
+    def episodes(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Durations [cycles] and outcomes of a trial's episodes, (num_episodes,) each."""
+        lines = (self._folder(number) / "episodes.csv").read_text(encoding="utf-8").splitlines()
+        rows = [line.split(",") for line in lines[1:]]
+        durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
+        outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
+        return durations, outcomes
+
+    def weights_hash(self, numbers: Iterable[int]) -> str:
+        """SHA-256 of every weight that the players of these trials have learned, in order.
+
+        It depends on the settings, the seed and the code alone: not on the run, on how many
+        processes played, nor on the version of Python.
+        """
+        digest = hashlib.sha256()
+        for number in numbers:
+            for path in sorted(self._folder(number).glob("*.npz")):
+                digest.update(load_weights(path).values.tobytes())
+        return digest.hexdigest()
+
+    def _folder(self, number: int) -> Path:
+        return self.path / f"trial_{number:04}"
+
+    def _learned(self, result: TrialResult) -> Iterator[LearnedWeights]:
+        """A weights file's content for every player that learned."""
+        config, training = self._training.trainer, self._training
+        task, before = config.task, training.start()
+        for own, name in enumerate(task.player_names):
+            role = Role.KEEPER if own < task.num_keepers else Role.TAKER
+            team = result.keeper_weights if role == Role.KEEPER else result.taker_weights
+            if team is None:
+                continue
+            earlier = before[own] if before and role == Role.KEEPER else None
+            yield LearnedWeights(
+                values=team[own if role == Role.KEEPER else own - task.num_keepers],
+                role=role,
+                num_keepers=task.num_keepers,
+                num_takers=task.num_takers,
+                field_length=task.field_length,
+                field_width=task.field_width,
+                tiling=config.tiling(role),
+                ordering=training.ordering,
+                sarsa=config.sarsa,
+                episodes=len(result.durations) + (earlier.episodes if earlier else 0),
+                hours=result.hours + (earlier.hours if earlier else 0.0),
+                seed=training.seed,
+                player=name,
+                code_version=code_version(),
+                created_by=self._command,
+            )
+
+
+def _episodes_text(result: TrialResult) -> str:
+    names = [Outcome(code).name.lower() for code in result.outcomes]
+    rows = zip(result.durations, names, strict=True)
+    lines = [f"{number},{cycles},{name}" for number, (cycles, name) in enumerate(rows)]
+    return "\n".join(["episode,cycles,outcome", *lines, ""])
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a text file that appears once it is whole."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(path)
+
+
+def _check_same(path: Path, record: dict[str, Any], any_code: bool) -> None:
+    """Refuse to mix results of different settings or versions."""
+    try:
+        there = json.loads((path / "training.json").read_text(encoding="utf-8"))
+        settings, version = dict(there["settings"]), there["code_version"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise AgentError(f"{path / 'training.json'} is no training's: {error!r}") from error
+    for name, value in record["settings"].items():
+        if settings.get(name) != value:
+            raise AgentError(
+                f"{path} holds a training with {name}={settings.get(name)!r}, not {value!r}:"
+                " use the same settings, or name another folder"
+            )
+    if version != record["code_version"] and not any_code:
+        raise AgentError(
+            f"{path} was begun by version {version}, this is {record['code_version']}:"
+            " name another folder, or allow it (--any-code)"
+        )

@@ -1,0 +1,144 @@
+"""A tally written for people and for programs: summary, table, figures."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from keepaway_sim.analysis.figures import (
+    WITH_BALL,
+    actions_figure,
+    hold_time_figure,
+    losses_figure,
+    passes_figure,
+)
+from keepaway_sim.analysis.tally import Analyst, EpisodeRow, Tally
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.task import Action, Outcome
+
+ROWS_AT_ONCE = 5000  # episodes that are written together
+SCHEMA = pa.schema(
+    [
+        (name, {int: pa.int64(), float: pa.float64(), str: pa.string()}[kind])
+        for name, kind in {
+            "number": int, "start_s": float, "cycles": int, "duration_s": float, "outcome": str,
+            "lost_by": str, "lost_x": float, "lost_y": float, "passes": int, "decisions": int,
+            "holds": int, "held_cycles": int,
+        }.items()
+    ]
+)  # fmt: skip
+
+
+def analyse(path: Path | str, output: Path) -> str:
+    """Write table and figures of a bag, and give a summary in words.
+
+    Writes `episodes.csv`, `episodes.parquet`, `summary.json`, and four figures.
+
+    Args:
+        path: the bag.
+        output: folder to write to.
+
+    Raises:
+        KeepawayError: no such bag.
+    """
+    bag = MatchBag(path)
+    output.mkdir(parents=True, exist_ok=True)
+    analyst = Analyst(bag)
+    _write_table(analyst.rows(), output)
+    tally, task = analyst.tally, bag.task
+    summary = summarise(bag, tally)
+    (output / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    made_by = f"{bag.match['task']}, seed {bag.match['seed']}, {bag.match['code_version']}"
+    for name, figure in (
+        ("hold_time", hold_time_figure(np.array(tally.durations))),
+        ("passes", passes_figure(tally.passes, task)),
+        ("losses", losses_figure(np.array(tally.losses).reshape(-1, 3), task)),
+        ("actions", actions_figure(tally.actions, task)),
+    ):
+        figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
+        figure.savefig(output / f"{name}.png", dpi=150, metadata={"Description": made_by})
+    return in_words(summary)
+
+
+def _write_table(rows: Iterator[EpisodeRow], output: Path) -> None:
+    with ExitStack() as stack:
+        parquet = stack.enter_context(pq.ParquetWriter(output / "episodes.parquet", SCHEMA))
+        file = stack.enter_context((output / "episodes.csv").open("w", newline=""))
+        writer = csv.writer(file)
+        writer.writerow(EpisodeRow._fields)
+        pending: list[EpisodeRow] = []
+        for row in rows:
+            writer.writerow(row)
+            pending.append(row)
+            if len(pending) == ROWS_AT_ONCE:
+                parquet.write_table(_arrow(pending))
+                pending.clear()
+        parquet.write_table(_arrow(pending))
+
+
+def _arrow(rows: list[EpisodeRow]) -> pa.Table:
+    columns = zip(*rows, strict=True) if rows else ((),) * len(SCHEMA)
+    return pa.table([list(column) for column in columns], schema=SCHEMA)
+
+
+def summarise(bag: MatchBag, tally: Tally) -> dict[str, Any]:
+    """A match in a few numbers."""
+    durations = np.array(tally.durations)
+    outcomes = np.array([outcome for *_, outcome in tally.losses], dtype=np.int64)
+    count = len(durations)
+    actions = {
+        name: {
+            action.name.lower(): int(number)
+            for action, number in zip(Action, tally.actions[player], strict=True)
+            if number
+        }
+        for player, name in enumerate(bag.match["player_names"])
+    }
+    return {
+        "task": bag.match["task"],
+        "seed": bag.match["seed"],
+        "code_version": bag.match["code_version"],
+        "messages": bag.reader.message_count,
+        "episodes": count,
+        "mean_duration_s": float(durations.mean()) if count else None,
+        "sem_duration_s": float(durations.std(ddof=1) / np.sqrt(count)) if count > 1 else None,
+        "out_of_bounds_share": float((outcomes == Outcome.OUT_OF_BOUNDS).mean()) if count else None,
+        "passes": tally.passes.tolist(),
+        "passes_per_episode": float(tally.passes.sum() / count) if count else None,
+        "actions": actions,
+    }
+
+
+def in_words(summary: Mapping[str, Any]) -> str:
+    """A summary as lines for a person."""
+    if not summary["episodes"]:
+        return f"{summary['task']}: no finished episode in {summary['messages']:,} messages"
+    sem = summary["sem_duration_s"]
+    spread = f" +- {sem:.2f}" if sem is not None else ""
+    lines = [
+        f"{summary['task']}: {summary['episodes']:,} episodes in {summary['messages']:,} messages",
+        f"held {summary['mean_duration_s']:.2f}{spread} s on average,"
+        f" {summary['out_of_bounds_share']:.0%} ended out of bounds,"
+        f" {summary['passes_per_episode']:.1f} passes arrived an episode",
+    ]
+    with_ball = {action.name.lower() for action in WITH_BALL}
+    for name, actions in summary["actions"].items():
+        choices = {action: n for action, n in actions.items() if action in with_ball}
+        others = {action: n for action, n in actions.items() if action not in with_ball}
+        said = [_shares(choices, " with the ball"), _shares(others, "")]
+        lines.append(f"{name}: {'; '.join(filter(None, said)) or 'asked for nothing'}")
+    return "\n".join(lines)
+
+
+def _shares(actions: Mapping[str, int], when: str) -> str:
+    total = sum(actions.values())
+    shares = ", ".join(f"{name} {count / total:.0%}" for name, count in actions.items())
+    return shares and f"{shares} of {total:,} requests{when}"

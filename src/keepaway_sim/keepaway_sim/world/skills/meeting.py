@@ -1,0 +1,145 @@
+"""Running to the ball and taking it."""
+
+from __future__ import annotations
+
+import math
+
+from keepaway_sim.world.compiled import compiled
+from keepaway_sim.world.geometry import clip, length, wrap
+from keepaway_sim.world.skills.kicking import FREEZE_SHARE, closest_opponent_to
+from keepaway_sim.world.skills.prediction import (
+    LOOK_AHEAD,
+    dash_power,
+    heading_to_go,
+    meeting_cycles,
+    turn_moment,
+)
+from keepaway_sim.world.skills.running import dash_to, direction_of_play, turn_body_along
+from keepaway_sim.world.state import DASH, NONE, TURN
+
+CLOSE_RANGE = 3.0  # [m] an opponent so near makes a player take the ball at once
+FACING = math.radians(25.0)  # [rad] faces its direction of play well enough
+
+
+@compiled
+def intercept(c, s, m, f, p):
+    """Go where the ball can be met first (P: intercept, predictCommandToInterceptBall)."""
+    ball = c.num_keepers + c.num_takers
+    x, y = s.position[f, p, p]
+    vx, vy = s.velocity[f, p, p]
+    ux, uy = math.cos(s.body[f, p, p]), math.sin(s.body[f, p, p])
+    now = s.cycle[f]
+    has_old = m.intercept_cycle[f, p] >= now - 2
+    cycles, to_x, to_y = meeting_cycles(
+        c,
+        x,
+        y,
+        vx,
+        vy,
+        ux,
+        uy,
+        s.position[f, p, ball],
+        s.velocity[f, p, ball],
+        m.intercept_point[f, p, 0],
+        m.intercept_point[f, p, 1],
+        has_old,
+    )
+    m.intercept_cycle[f, p] = now
+    m.intercept_point[f, p, 0], m.intercept_point[f, p, 1] = to_x, to_y
+    if cycles < 3:
+        close = meet_closely(c, s, f, p)
+        if close[0] != NONE:
+            return close
+    roll = c.player_roll[min(cycles, LOOK_AHEAD)]
+    if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
+        return turn_body_along(c, s, f, p, direction_of_play(c, p))
+    turns, wx, wy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
+    if turns:
+        angle = math.atan2(ux * wy - uy * wx, ux * wx + uy * wy)
+        return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
+    return dash_to(c, s, f, p, to_x, to_y, max(cycles, 1))
+
+
+@compiled
+def meet_closely(c, s, f, p):
+    """Command for a ball that can be met within two cycles; NONE if nothing helps.
+
+    With an opponent near, a dash brings the ball into reach at once; otherwise the player first
+    turns toward its direction of play while the ball comes (P: interceptClose).
+    """
+    ball = c.num_keepers + c.num_takers
+    px, py = s.position[f, p, p]
+    vx, vy = s.velocity[f, p, p]
+    bx, by = s.position[f, p, ball]
+    ux, uy = s.velocity[f, p, ball]
+    power, dash_helps = _one_dash(c, s, f, p)
+    if dash_helps and closest_opponent_to(c, s, f, p, px, py)[1] < CLOSE_RANGE:
+        return DASH, power, 0.0
+    forward = direction_of_play(c, p)
+    yaw = s.body[f, p, p]
+    turn = turn_body_along(c, s, f, p, forward)
+    within = FREEZE_SHARE * c.kickable_distance
+    turn_helps = False
+    reached = yaw
+    speed = length(vx, vy)
+    for cycles in (1, 2):
+        angle = wrap(forward - reached)
+        reached += turn_moment(c, angle, speed) / (1.0 + c.inertia_moment * speed)
+        speed *= c.player_decay
+        roll, ball_roll = c.player_roll[cycles], c.ball_roll[cycles]
+        away = length(px + roll * vx - bx - ball_roll * ux, py + roll * vy - by - ball_roll * uy)
+        if away < within:
+            turn_helps = True
+            if abs(wrap(forward - reached)) < FACING:
+                return turn
+    if abs(wrap(forward - yaw)) > FACING:
+        kind, stop, _ = dash_to(c, s, f, p, px, py, 1)
+        sx = px + vx + c.dash_power_rate * stop * math.cos(yaw)
+        sy = py + vy + c.dash_power_rate * stop * math.sin(yaw)
+        ball_roll = c.ball_roll[2]
+        if length(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
+            return kind, stop, 0.0
+    if turn_helps:
+        return turn
+    if dash_helps:
+        return DASH, power, 0.0
+    return NONE, 0.0, 0.0
+
+
+@compiled
+def _one_dash(c, s, f, p):
+    """(power, helps): the dash after which the ball lies in front of the body and in reach.
+
+    The player's line of movement is cut with a circle around the next place of the ball; of the
+    two points the one further in its direction of play is taken, then the other.
+    """
+    ball = c.num_keepers + c.num_takers
+    px, py = s.position[f, p, p]
+    vx, vy = s.velocity[f, p, p]
+    yaw = s.body[f, p, p]
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    bx = s.position[f, p, ball, 0] + s.velocity[f, p, ball, 0]
+    by = s.position[f, p, ball, 1] + s.velocity[f, p, ball, 1]
+    speed = cosine * vx + sine * vy
+    rel_x, rel_y = bx - px - vx, by - py - vy
+    along, across = cosine * rel_x + sine * rel_y, cosine * rel_y - sine * rel_x
+    reach = c.touch_distance + c.kickable_margin / 6.0
+    half = reach * reach - across * across
+    if half >= 0.0:
+        step = math.sqrt(half)
+        if (cosine if p < c.num_keepers else -cosine) < 0.0:
+            step = -step
+        for sign in (1.0, -1.0):
+            power, away = _dash_result(c, along + sign * step, speed, along, across)
+            if away < 0.95 * c.kickable_distance:
+                return power, True
+    power, away = _dash_result(c, along, speed, along, across)
+    return power, away < 0.95 * c.kickable_distance
+
+
+@compiled
+def _dash_result(c, wanted, speed, along, across):
+    """(power, distance to the ball) of a dash meant to end `wanted` beyond rolling out once."""
+    power = dash_power(c, wanted + speed, speed, 1)
+    gained = clip(power, c.min_dash_power, 100.0) * c.dash_power_rate
+    return power, length(along - gained, across)
