@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import domain_coordinator
 import hypothesis
 import pytest
+from recorded import record_match
 
 if TYPE_CHECKING:
     from graph import Graph
@@ -60,3 +61,9 @@ def graph(ros_domain: int) -> "Iterator[Graph]":
     made = Graph(ros_domain)
     yield made
     made.close()
+
+
+@pytest.fixture(scope="session")
+def bag_3v2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of four episodes of 3v2, recorded without ROS."""
+    return record_match(tmp_path_factory.mktemp("bags") / "match_3v2", "3v2", seed=7, episodes=4)

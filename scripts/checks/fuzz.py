@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
-from scripts.checks.mutations import broken
+from mutations import broken
 
 from keepaway_agent.actions import Action, Role
 from keepaway_agent.errors import AgentError, WeightsError

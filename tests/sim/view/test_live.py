@@ -142,7 +142,7 @@ def test_nothing_else_is_there_and_nothing_can_be_sent(server: Server) -> None:
 
 
 def test_too_many_browsers_are_refused(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live, "MAX_BROWSERS", 1)
+    monkeypatch.setattr(serving, "MAX_BROWSERS", 1)
     with server.browser():
         assert ask(server, "/events")[0] == 503
 
