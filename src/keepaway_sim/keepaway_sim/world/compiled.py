@@ -1,34 +1,66 @@
-"""How this package compiles its functions of arrays.
+"""How compiled functions of arrays are made, and where their machine code is kept.
 
 `compiled` is numba's `njit` with settings that fit small functions called millions of times a
-second on rows of arrays that others own: machine code is kept on disk; functions are compiled into
-their callers, because handing on some thirty arrays takes longer than a player's decision; division
-follows IEEE; arrays are not reference-counted, so such a function allocates none and writes into
-what it is given. Floating-point rules stay strict (no `fastmath`): the same bits from every caller.
+second on rows of arrays that others own: functions are compiled into their callers, because passing
+their arguments on takes longer than a player's decision; division follows IEEE, without a branch
+for dividing by zero; arrays are not reference-counted, so such a function allocates none and writes
+into what it is given. Floating-point rules stay strict (no `fastmath`): the same bits from every
+caller.
 
-The agents' package has the same few lines: agents share nothing with the simulator.
+Machine code is kept on disk in a folder named by everything that it was made from: the sources of
+both packages that hold compiled functions, numba, numpy, Python and the processor. So it is never
+stale, whatever time stamps say, and checkouts of the same sources share it. Numba's own cache looks
+at one source file alone, and would go on using code into which an older callee was compiled.
+
+The packages of the world and of the agents share no code, so each has this same file; a contract
+test holds the two together.
 """
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable
+import functools
+import hashlib
+import importlib.util
+import logging
+import os
+import platform
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+import llvmlite.binding
+import numba
+import numpy as np
 from numba import njit, typeof
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 
-_SETTINGS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+SOURCES: Final = (
+    "actions.py",
+    "compiled.py",
+    "learning",
+    "playing",
+    "task.py",
+    "training/trainer.py",
+    "world",
+)
+"""Files and folders of both packages from which machine code is made."""
+KEPT_FOLDERS: Final = 8
+"""Folders of machine code that stay on disk; the least recently used ones go."""
+
+_SETTINGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_LOG = logging.getLogger(__name__)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function of arrays into its callers."""
-    return njit(forceinline=True, **_SETTINGS)(function)
+    return _kept(njit(forceinline=True, **_SETTINGS)(function))
 
 
 def compiled_apart(function: Callable[..., Any]) -> Any:
     """Compile a function of its own: an entry point, or a long one called from many places."""
-    return njit(**_SETTINGS)(function)
+    return _kept(njit(**_SETTINGS)(function))
 
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., Any]:
@@ -42,17 +74,108 @@ def entry_point(function: Any, *arguments: Any) -> Callable[..., Any]:
     return code
 
 
-def drop_stale_cache(package: Path) -> None:
-    """Remove a package's cached machine code that is older than its newest source file.
+def _kept(dispatcher: Any) -> Any:
+    """Let a compiled function keep its machine code on disk, if there is a place for it."""
+    if cache_folder() is not None:
+        dispatcher._cache = _SharedCache(dispatcher.py_func)
+    return dispatcher
 
-    Numba looks at the source of the cached function alone and would go on using machine code into
-    which an older version of another file was compiled. Several processes may do this at once.
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Where machine code of these sources is kept; None (said once) where nothing can be written.
+
+    In `NUMBA_CACHE_DIR` if it is set, else in the user's cache folder.
     """
-    newest = max(source.stat().st_mtime_ns for source in package.rglob("*.py"))
-    for cached in package.rglob("__pycache__/*.nb[ic]"):
-        with contextlib.suppress(FileNotFoundError):
-            if cached.stat().st_mtime_ns < newest:
-                cached.unlink()
+    for base in _places():
+        folder = base / "keepaway" / f"machine_code-{_fingerprint()[:24]}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            os.utime(folder)
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+        except OSError:
+            continue
+        _drop_old(folder)
+        return folder
+    _LOG.warning(
+        "machine code cannot be kept: no folder can be written (set NUMBA_CACHE_DIR to one);"
+        " each process compiles anew"
+    )
+    return None
 
 
-drop_stale_cache(Path(__file__).parents[1])
+def _places() -> Iterator[Path]:
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(chosen)
+    if chosen := os.environ.get("XDG_CACHE_HOME"):
+        yield Path(chosen)
+    home = os.path.expanduser("~")  # noqa: PTH111 - Path.home() fails where there is none
+    if Path(home).is_absolute():
+        yield Path(home) / ".cache"
+
+
+@functools.cache
+def _fingerprint() -> str:
+    """A hash of all that machine code depends on."""
+    digest = hashlib.sha256()
+    versions = numba.__version__, llvmlite.__version__, np.__version__
+    processor = llvmlite.binding.get_host_cpu_name(), numba.config.CPU_NAME
+    features = llvmlite.binding.get_host_cpu_features().flatten(), numba.config.CPU_FEATURES
+    digest.update(repr((platform.python_version(), versions, processor, features)).encode())
+    for source in sources():
+        text = source.read_bytes()
+        digest.update(f"{source.name} {len(text)} ".encode() + text)
+    return digest.hexdigest()
+
+
+def sources() -> list[Path]:
+    """Every source file of both packages from which machine code is made."""
+    found: list[Path] = []
+    for package in ("keepaway_agent", "keepaway_sim"):
+        spec = importlib.util.find_spec(package)
+        if spec is None or spec.origin is None:
+            continue  # agents run without the simulator's package
+        for name in SOURCES:
+            place = Path(spec.origin).parent / name
+            found += sorted(place.rglob("*.py")) if place.is_dir() else [place][: place.is_file()]
+    return found
+
+
+def _drop_old(folder: Path) -> None:
+    """Remove folders of other sources but for those used last; others may do so at once."""
+    try:
+        known = sorted(folder.parent.glob("machine_code-*"), key=lambda path: path.stat().st_mtime)
+    except OSError:
+        return
+    for old in known[:-KEPT_FOLDERS]:
+        if old != folder:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+class _Locator(_CacheLocator):  # type: ignore[misc]
+    """Names numba the folder; its name says all that a source's time stamp would."""
+
+    def __init__(self, py_func: Any) -> None:
+        self._name = f"{py_func.__module__}-{py_func.__code__.co_firstlineno}"
+
+    def get_cache_path(self) -> str:
+        return str(cache_folder())
+
+    def get_source_stamp(self) -> str:
+        return _fingerprint()
+
+    def get_disambiguator(self) -> str:
+        return str(self._name)
+
+    @classmethod
+    def from_function(cls, py_func: Any, _py_file: str) -> _Locator:
+        return cls(py_func)
+
+
+class _SharedCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = [_Locator]  # noqa: RUF012 - as numba declares it
+
+
+class _SharedCache(FunctionCache):  # type: ignore[misc]
+    _impl_class = _SharedCacheImpl
