@@ -35,8 +35,8 @@ def main() -> None:
         api = [write_api(package, laid_out) for package in PACKAGES]
         settings = Path(folder) / "mkdocs.yml"
         settings.write_text(yaml.safe_dump(site(laid_out, arguments.out.resolve(), api)))
-        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", settings]
-        done = subprocess.run(command, check=False)
+        build = ["build", "--strict", "--quiet", "-f", str(settings)]
+        done = subprocess.run([sys.executable, "-m", "mkdocs", *build], check=False)
     if done.returncode:
         sys.exit("docs: the site was not built; mkdocs says above which page is wrong")
     print(f"documentation: {arguments.out / 'index.html'}")

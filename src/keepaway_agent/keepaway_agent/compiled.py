@@ -120,8 +120,11 @@ def _fingerprint() -> str:
     """A hash of all that machine code depends on."""
     digest = hashlib.sha256()
     versions = numba.__version__, llvmlite.__version__, np.__version__
-    processor = llvmlite.binding.get_host_cpu_name(), numba.config.CPU_NAME
-    features = llvmlite.binding.get_host_cpu_features().flatten(), numba.config.CPU_FEATURES
+    processor = llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_CPU_NAME")
+    features = (
+        llvmlite.binding.get_host_cpu_features().flatten(),
+        os.environ.get("NUMBA_CPU_FEATURES"),
+    )
     digest.update(repr((platform.python_version(), versions, processor, features)).encode())
     for source in sources():
         text = source.read_bytes()
@@ -153,7 +156,7 @@ def _drop_old(folder: Path) -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
-class _Locator(_CacheLocator):  # type: ignore[misc]
+class _Locator(_CacheLocator):
     """Names numba the folder; its name says all that a source's time stamp would."""
 
     def __init__(self, py_func: Any) -> None:
@@ -173,9 +176,9 @@ class _Locator(_CacheLocator):  # type: ignore[misc]
         return cls(py_func)
 
 
-class _SharedCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = [_Locator]  # noqa: RUF012 - as numba declares it
+class _SharedCacheImpl(CompileResultCacheImpl):
+    _locator_classes: list[Any] = [_Locator]  # noqa: RUF012 - as numba declares it
 
 
-class _SharedCache(FunctionCache):  # type: ignore[misc]
+class _SharedCache(FunctionCache):
     _impl_class = _SharedCacheImpl
