@@ -76,7 +76,7 @@ def entry_point(function: Any, *arguments: Any) -> Callable[..., Any]:
 
 def _kept(dispatcher: Any) -> Any:
     """Let a compiled function keep its machine code on disk, if there is a place for it."""
-    if cache_folder() is not None:
+    if hasattr(dispatcher, "py_func") and cache_folder() is not None:  # not with DISABLE_JIT
         dispatcher._cache = _SharedCache(dispatcher.py_func)
     return dispatcher
 
