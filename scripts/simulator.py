@@ -11,7 +11,8 @@ import argparse
 import sys
 
 from keepaway_sim.cli.options import add_options, parse_node_arguments
-from keepaway_sim.nodes.simulator import Settings, main
+from keepaway_sim.match.settings import MatchSettings
+from keepaway_sim.nodes.simulator import main
 from keepaway_sim.world.config import Physics, Skills, Vision
 
 
@@ -21,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument("--profile", default=argparse.SUPPRESS, help="2005 (default) or v19")
-    for group in (Settings, Physics, Vision, Skills):
+    for group in (MatchSettings, Physics, Vision, Skills):
         add_options(made, group)
     return made
 

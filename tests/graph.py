@@ -77,7 +77,7 @@ class Graph:
         give_up = time.monotonic() + PATIENCE
         self.simulator.play(self.spin, lambda: until() or time.monotonic() > give_up)
         assert time.monotonic() < give_up, "the match did not end"
-        self.spin_until(lambda: len(self.episodes) >= self.simulator.num_finished)
+        self.spin_until(lambda: len(self.episodes) >= self.simulator.conductor.num_finished)
         return [(episode.cycles, episode.outcome) for episode in self.episodes]
 
     def spin_until(self, is_done: Callable[[], bool]) -> None:

@@ -39,8 +39,8 @@ from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.beginning import begin_match
-from keepaway_sim.match.roster import Roster
-from keepaway_sim.nodes.simulator import Settings, read_status
+from keepaway_sim.match.roster import Roster, checked_status
+from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Task
 from keepaway_sim.view.live import LiveMatch
 from keepaway_sim.wire import messages
@@ -157,11 +157,11 @@ def make_targets(folder: Path) -> dict[str, Target]:
         **text_targets(folder),
         "request": Target(request_taker(world), requests(), (KeepawayError,)),
         "status": Target(
-            lambda data: read_status(data, 0, "keeper_1"), [status()], (KeepawayError,)
+            lambda data: checked_status(data, 0, "keeper_1"), [status()], (KeepawayError,)
         ),
         "perception": Target(perceiver(), perceptions(world), (AgentError,)),
         "live page": Target(live_page(), live_messages(world), (KeepawayError,)),
-        "simulator's parameters": Target(make_settings, [plain(Settings())], (KeepawayError,)),
+        "simulator's parameters": Target(make_settings, [plain(MatchSettings())], (KeepawayError,)),
         "world's parameters": Target(make_world, world_parameters(), (KeepawayError,)),
         "player's parameters": Target(make_agent, [plain(AgentConfig())], (AgentError,)),
     }
@@ -404,8 +404,8 @@ def of_their_types(given: dict[str, Any], defaults: Any) -> dict[str, Any]:
 
 def make_settings(data: bytes) -> object:
     """A simulator's settings."""
-    default = Settings()
-    return Settings(**of_their_types(parameters_of(data, set(asdict(default))), default))
+    default = MatchSettings()
+    return MatchSettings(**of_their_types(parameters_of(data, set(asdict(default))), default))
 
 
 def make_world(data: bytes) -> object:

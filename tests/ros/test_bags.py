@@ -125,9 +125,13 @@ def test_in_lock_step_the_simulator_waits_for_its_recorder(graph: Graph, tmp_pat
 
     def poll_rarely() -> None:
         """Only when the simulator has waited a while."""
-        lag = graph.simulator._recorder_lag()
+        lag = graph.simulator.conductor.recorder_lag
         furthest.append(lag)
-        if lag > 50 or not graph.simulator._recorded or furthest[-100:] == [lag] * 100:
+        if (
+            lag > 50
+            or not graph.simulator.conductor.recorders.num_reporting
+            or furthest[-100:] == [lag] * 100
+        ):
             recorder.poll()
 
     graph.hook = poll_rarely
@@ -146,7 +150,7 @@ def test_of_several_recorders_it_waits_for_the_slowest(graph: Graph, tmp_path: P
 
     def poll_the_second_rarely() -> None:
         recorders[0].poll()
-        if len(graph.simulator._recorded) < 2 or next(turns) % 500 == 0:
+        if graph.simulator.conductor.recorders.num_reporting < 2 or next(turns) % 500 == 0:
             recorders[1].poll()
 
     graph.hook = poll_the_second_rarely
@@ -164,7 +168,7 @@ def test_what_a_recorder_loses_it_names(graph: Graph, tmp_path: Path) -> None:
     polls = iter(range(10**9))
 
     def poll_too_rarely() -> None:
-        if graph.simulator.num_cycles == 0 or next(polls) % 300 == 0:
+        if graph.simulator.conductor.num_cycles == 0 or next(polls) % 300 == 0:
             recorder.poll()
 
     graph.hook = poll_too_rarely

@@ -46,7 +46,7 @@ def test_a_simulator_goes_on_with_the_episode_it_is_told(graph: Graph) -> None:
     graph.executor.remove_node(graph.simulator)
     graph.simulator.destroy_node()
     graph.start_simulator(episodes=4, first_episode=2, **PATIENT)
-    graph.spin_until(lambda: not graph.simulator.roster.absent)
+    graph.spin_until(lambda: not graph.simulator.conductor.roster.absent)
     graph.play()
     assert [episode.number for episode in graph.episodes] == [0, 1, 2, 3]
     lengths = [episode.cycles for episode in graph.episodes]
@@ -63,8 +63,8 @@ def test_a_full_disk_ends_the_recording_but_not_the_match(
     bag, expected = tmp_path / "bag", trained(3, policy="random")
     simulator = graph.start_simulator(episodes=3, record=str(bag), **PATIENT)
     graph.start_players(policy="random")
-    graph.play(until=lambda: simulator.num_finished >= 1)
-    simulator._voice.write_down()
+    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
+    simulator._publisher.write_recorded()
     simulator._bag.flush()  # type: ignore[union-attr]
     full_disk(bag.joinpath("bag_0.mcap").stat().st_size + 100)
     assert graph.play() == played(expected)
@@ -85,7 +85,11 @@ def test_a_full_disk_leaves_the_weights_that_were_saved_and_later_ones_are_saved
     simulator = graph.start_simulator(episodes=3, **PATIENT)
     graph.play(until=lambda: path.exists())
     full_disk(1000)
-    graph.play(until=lambda: simulator.num_finished >= 2 and simulator.num_cycles % 7 == 0)
+    graph.play(
+        until=lambda: (
+            simulator.conductor.num_finished >= 2 and simulator.conductor.num_cycles % 7 == 0
+        )
+    )
     assert load_weights(path).episodes == 1
     full_disk(resource.RLIM_INFINITY)
     graph.play()

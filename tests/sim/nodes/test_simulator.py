@@ -54,7 +54,7 @@ def test_it_waits_for_everybody_and_says_for_whom(graph: Graph) -> None:
     graph.start_simulator(episodes=1, answer_timeout=SLOW_ENOUGH)
     for name in ("keeper_1", "keeper_3", "taker_1", "taker_2"):
         graph.start_player(name)
-    graph.play(until=lambda: graph.simulator.roster.absent == ["keeper_2"])
+    graph.play(until=lambda: graph.simulator.conductor.roster.absent == ["keeper_2"])
     assert graph.call(Trigger, "start").message == "waits for keeper_2"
     graph.start_player("keeper_2")
     assert graph.play() == played(trained(1))
@@ -63,16 +63,16 @@ def test_it_waits_for_everybody_and_says_for_whom(graph: Graph) -> None:
 def test_perceptions_that_are_lost_are_sent_again(
     graph: Graph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    say, count = publishing.Voice.say, 0
+    say, count = publishing.MatchPublisher.publish, 0
 
-    def lose_some(self: publishing.Voice, topic: str, data: bytes, time: int) -> None:
+    def lose_some(self: publishing.MatchPublisher, topic: str, data: bytes, time: int) -> None:
         nonlocal count
         is_in_play = topic.endswith("perception") and data[OUTCOME] == Outcome.IN_PLAY
         count += is_in_play
         if not is_in_play or count % 97:
             say(self, topic, data, time)
 
-    monkeypatch.setattr(publishing.Voice, "say", lose_some)
+    monkeypatch.setattr(publishing.MatchPublisher, "publish", lose_some)
     graph.start_simulator(episodes=2, answer_timeout=SLOW_ENOUGH)
     graph.start_players(policy="random")
     assert graph.play() == played(trained(2, policy="random"))
@@ -81,14 +81,14 @@ def test_perceptions_that_are_lost_are_sent_again(
 def test_an_episode_whose_end_is_lost_teaches_nothing(
     graph: Graph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    say = publishing.Voice.say
+    say = publishing.MatchPublisher.publish
 
-    def lose_ends(self: publishing.Voice, topic: str, data: bytes, time: int) -> None:
+    def lose_ends(self: publishing.MatchPublisher, topic: str, data: bytes, time: int) -> None:
         is_an_end = topic == "keeper_1/perception" and data[OUTCOME] != Outcome.IN_PLAY
-        if not is_an_end or graph.simulator.num_finished == 2:
+        if not is_an_end or graph.simulator.conductor.num_finished == 2:
             say(self, topic, data, time)
 
-    monkeypatch.setattr(publishing.Voice, "say", lose_ends)
+    monkeypatch.setattr(publishing.MatchPublisher, "publish", lose_ends)
     graph.start_simulator(episodes=3, answer_timeout=SLOW_ENOUGH)
     graph.start_players(policy="random")
     graph.play()
@@ -102,14 +102,14 @@ def test_a_frozen_player_is_missing_and_joins_at_the_next_kick_off(graph: Graph)
     simulator = graph.start_simulator(episodes=3, answer_timeout=QUICK)
     graph.start_players(policy="random")
     frozen = graph.players["keeper_2"]
-    graph.play(until=lambda: simulator.num_cycles >= 3)
+    graph.play(until=lambda: simulator.conductor.num_cycles >= 3)
     graph.executor.remove_node(frozen)
-    graph.play(until=lambda: simulator.num_finished >= 1)
-    assert simulator.roster.absent == ["keeper_2"]
-    assert simulator.roster.seats[1].missed > 3
+    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
+    assert simulator.conductor.roster.absent == ["keeper_2"]
+    assert simulator.conductor.roster.seats[1].missed > 3
     graph.executor.add_node(frozen)
     graph.play()
-    assert simulator.roster.absent == []
+    assert simulator.conductor.roster.absent == []
     assert [episode.number for episode in graph.episodes] == [0, 1, 2]
 
 
@@ -128,14 +128,14 @@ def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
     ]
 
     def lie() -> None:
-        if simulator.num_cycles % 10 == 0:
-            stranger.publish(lies[simulator.num_cycles // 10 % len(lies)])
+        if simulator.conductor.num_cycles % 10 == 0:
+            stranger.publish(lies[simulator.conductor.num_cycles // 10 % len(lies)])
 
     health: list[DiagnosticArray] = []
     graph.node.create_subscription(DiagnosticArray, "diagnostics", health.append, 10)
     graph.hook = lie
     assert graph.play() == played(trained(2, policy="random"))
-    assert simulator.roster.seats[0].rejected > 0
+    assert simulator.conductor.roster.seats[0].rejected > 0
     graph.spin_until(lambda: bool(health))
     assert health[-1].status[1].message == "2 nodes answer for it"
 
@@ -152,21 +152,21 @@ def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain:
     said: set[tuple[int, int]] = set()
 
     def meddle() -> None:
-        seen = simulator.world.perceptions
+        seen = simulator.conductor.world.perceptions
         moment = int(seen.episode[0]), int(seen.cycle[0])
         if moment in said:
             return
         said.add(moment)
         now = dict(zip(("episode", "cycle"), moment, strict=True))
         requests.publish(ActionRequest(action=ActionRequest.HOLD_BALL, **now))
-        if simulator.num_cycles % 10 == 0:
+        if simulator.conductor.num_cycles % 10 == 0:
             status.publish(AgentStatus(name="keeper_1", ready=True, episodes=1000))
 
-    graph.play(until=lambda: simulator.num_cycles >= 1)
+    graph.play(until=lambda: simulator.conductor.num_cycles >= 1)
     graph.spin_until(lambda: requests.get_subscription_count() > 0)
     graph.hook = meddle
     assert graph.play() == played(trained(6, policy="random"))
-    assert simulator.roster.seats[0].rejected > 10
+    assert simulator.conductor.roster.seats[0].rejected > 10
     stranger.destroy_node()
     context.shutdown()
 
@@ -189,18 +189,18 @@ def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
 def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:
     simulator = graph.start_simulator(autostart=False, answer_timeout=SLOW_ENOUGH)
     graph.start_players()
-    graph.play(until=lambda: not simulator.roster.absent)
-    assert simulator.num_cycles == 0
+    graph.play(until=lambda: not simulator.conductor.roster.absent)
+    assert simulator.conductor.num_cycles == 0
     assert graph.call(Trigger, "start").message == "plays"
-    graph.play(until=lambda: simulator.num_cycles >= 3)
+    graph.play(until=lambda: simulator.conductor.num_cycles >= 3)
     assert graph.call(Trigger, "pause").success
-    cycles = simulator.num_cycles
+    cycles = simulator.conductor.num_cycles
     until = time.monotonic() + 0.3
     graph.play(until=lambda: time.monotonic() > until)
-    assert simulator.num_cycles <= cycles + 1
+    assert simulator.conductor.num_cycles <= cycles + 1
     assert graph.call(Trigger, "start").success
     assert graph.call(Trigger, "reset").success
-    graph.play(until=lambda: simulator.num_finished >= 1)
+    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
     assert graph.episodes[0].outcome == Episode.ABORTED
 
 
@@ -233,25 +233,25 @@ def test_only_the_tempo_changes_during_a_match(graph: Graph) -> None:
         return bool(done.results[0].successful)
 
     assert set_to("speed", 2.0)
-    assert simulator.settings.speed == 2.0
+    assert simulator.conductor.settings.speed == 2.0
     assert not set_to("speed", -1.0)
     assert not set_to("ball_decay", 0.5)
-    assert simulator.settings.speed == 2.0
+    assert simulator.conductor.settings.speed == 2.0
 
 
 def test_real_time_and_its_multiples_are_kept(graph: Graph) -> None:
     simulator = graph.start_simulator(speed=4.0, answer_timeout=SLOW_ENOUGH)
     graph.start_players()
-    graph.play(until=lambda: simulator.num_cycles >= 1)
-    began, first = time.monotonic(), simulator.num_cycles
-    graph.play(until=lambda: simulator.num_cycles >= first + 40)
+    graph.play(until=lambda: simulator.conductor.num_cycles >= 1)
+    began, first = time.monotonic(), simulator.conductor.num_cycles
+    graph.play(until=lambda: simulator.conductor.num_cycles >= first + 40)
     assert time.monotonic() - began == pytest.approx(1.0, abs=0.25)
 
 
 def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
     simulator = graph.start_simulator(episodes=2, seed=4, answer_timeout=SLOW_ENOUGH)
     graph.start_players()
-    graph.play(until=lambda: simulator.num_finished >= 1)
+    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
     seen: dict[str, list[object]] = {}
     for topic, message, qos in (
         ("match", Match, LATCHED),

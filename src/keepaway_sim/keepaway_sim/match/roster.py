@@ -12,12 +12,14 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Role, Task
-from keepaway_sim.wire.messages import Request, read_request
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.wire.messages import AGENT_STATUS, Request, read_request
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.cycle import is_legal
@@ -238,6 +240,18 @@ def checked_request(data: bytes) -> Request:
     if count and not all(map(math.isfinite, struct.unpack_from(f"<{count}d", data, 28))):
         raise KeepawayError("action values that are not finite")
     return read_request(data)
+
+
+def checked_status(data: bytes, player: int, name: str) -> dict[str, Any]:
+    """The fields of an AgentStatus's bytes; those of a ready player are of the named one.
+
+    Raises:
+        KeepawayError: bytes that are no AgentStatus, or one of another player.
+    """
+    status = codec(AGENT_STATUS).decode(data)
+    if status["ready"] and (status["player_index"], status["name"]) != (player, name):
+        raise KeepawayError(f"the status of {status['name']!r}, player {status['player_index']}")
+    return status
 
 
 def _legal_requests(task: Task, config: Config) -> frozenset[tuple[int, int, int]]:

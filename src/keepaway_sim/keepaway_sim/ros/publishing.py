@@ -1,4 +1,4 @@
-"""What a simulator says: publishers of bytes, and a bag that gets the same bytes."""
+"""What a simulator publishes: bytes, and a bag that gets the same bytes."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ TOPICS = {
 }
 
 
-class Voice:
-    """Says messages, given as CDR bytes, on a node's topics and into a bag.
+class MatchPublisher:
+    """Publishes messages, given as CDR bytes, on a node's topics and writes them into a bag.
 
     Attributes:
         trouble: why the bag is no longer written, in words; empty while it is.
@@ -42,56 +42,58 @@ class Voice:
         perceptions = {f"{name}/perception": _PERCEPTION for name in player_names}
         self._bag, self._logger = bag, node.get_logger()
         self.trouble = ""
-        self._notes: list[tuple[str, str, bytes, int]] = []
+        self._prefix = node.get_namespace().rstrip("/") + "/"
+        self._unwritten: list[tuple[str, str, bytes, int]] = []
         self._publishers: dict[str, Publisher] = {}
         self._types: dict[str, str] = {}
         for topic, (message_class, message_type, qos) in (TOPICS | perceptions).items():
             self._publishers[topic] = node.create_publisher(message_class, topic, qos)
             self._types[topic] = message_type
 
-    def say(self, topic: str, data: bytes, time: int) -> None:
+    def publish(self, topic: str, data: bytes, time: int) -> None:
         """Publish, and record as of `time` [simulated ns]."""
         publisher = self._publishers[topic]
         publisher.publish(data)
         if self._bag is not None:
-            self.note(publisher.topic_name, self._types[topic], data, time)
+            self._unwritten.append((publisher.topic_name, self._types[topic], data, time))
 
     def repeat(self, topic: str, data: bytes) -> None:
-        """Publish what was said before."""
+        """Publish once more what was published before."""
         self._publishers[topic].publish(data)
 
-    def say_if_heard(self, topic: str, make: Callable[[], bytes], time: int) -> None:
-        """Make the message if somebody listens or a bag is written, and publish or record it."""
-        if self.has_listeners(topic):
-            self.say(topic, make(), time)
+    def publish_if_wanted(self, topic: str, make: Callable[[], bytes], time: int) -> None:
+        """Make the message where it is subscribed to or recorded, and publish or record it."""
+        if self.has_subscribers(topic):
+            self.publish(topic, make(), time)
         elif self._bag is not None:
-            self.note(self._publishers[topic].topic_name, self._types[topic], make(), time)
+            name = self._publishers[topic].topic_name
+            self._unwritten.append((name, self._types[topic], make(), time))
 
-    def has_listeners(self, topic: str) -> bool:
-        """Does anybody listen?"""
+    def has_subscribers(self, topic: str) -> bool:
+        """Whether anything subscribes to it."""
         return bool(self._publishers[topic].get_subscription_count())
 
-    def wait_until_heard(self, topic: str, patience: float) -> None:
-        """Wait until what was said on a topic has arrived everywhere, at most so many seconds."""
+    def wait_until_received(self, topic: str, patience: float) -> None:
+        """Wait until all subscribers have what was published, at most so many seconds."""
         self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
 
-    def note(self, topic: str, message_type: str, data: bytes, time: int) -> None:
-        """Record what somebody else said, if a bag is written; `topic` is its name in full."""
+    def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
+        """Record what another node published, if a bag is written; `topic` is relative."""
         if self._bag is not None:
-            self._notes.append((topic, message_type, data, time))
+            self._unwritten.append((self._prefix + topic, message_type, data, time))
 
-    def write_down(self) -> None:
-        """Write into the bag what was said and noted since the last time.
+    def write_recorded(self) -> None:
+        """Write into the bag what was recorded since the last time.
 
-        Done while the players think, so that a recorded match is hardly slower. A bag that cannot
+        Done while the players decide, so that a recorded match is hardly slower. A bag that cannot
         be written (the disk is full) ends there; the match does not.
         """
-        notes, self._notes = self._notes, []
+        messages, self._unwritten = self._unwritten, []
         if self._bag is None:
             return
         try:
-            for note in notes:
-                self._bag.write(*note)
+            for message in messages:
+                self._bag.write(*message)
         except KeepawayError as error:
             self._bag, self.trouble = None, str(error)
             self._logger.error(f"the match goes on unrecorded: {error}")
