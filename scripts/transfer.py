@@ -18,6 +18,7 @@ from pathlib import Path
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.cmac import WIDTH_PROFILES
 from keepaway_agent.learning.weights import load_weights, save_weights
+from keepaway_agent.texts import one_line
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import load_mapping
@@ -43,7 +44,7 @@ def _apply(arguments: argparse.Namespace) -> int:
         step = Transfer(task, arguments.variant, mapping, arguments.seed, arguments.widths)
         weights = transferred(weights, step)
     command = shlex.join(["scripts/transfer.py", *sys.argv[1:]])
-    weights = dataclasses.replace(weights, created_by=command)
+    weights = dataclasses.replace(weights, created_by=one_line(command))
     save_weights(arguments.out, weights, overwrite=arguments.overwrite)
     how = f"by {arguments.mapping or arguments.variant}"
     print(f"{source.task} -> {' -> '.join(arguments.tasks)} {how}: {arguments.out}")

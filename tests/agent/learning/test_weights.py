@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
+import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,7 @@ from hypothesis import strategies as st
 
 from keepaway_agent.actions import Role
 from keepaway_agent.errors import WeightsError
+from keepaway_agent.learning import weights as weights_module
 from keepaway_agent.learning.cmac import make_tiling
 from keepaway_agent.learning.sarsa import SarsaConfig
 from keepaway_agent.learning.weights import (
@@ -32,6 +35,7 @@ from keepaway_agent.learning.weights import (
     to_metadata,
     write_weights,
 )
+from keepaway_sim import task
 
 
 def make_weights(
@@ -264,6 +268,130 @@ def test_a_header_that_promises_more_than_there_is_is_not_believed():
     members = members_of(WHOLE) | {"weights.npy": header.getvalue()}
     with pytest.raises(WeightsError, match="1099511627776"):
         read_weights(with_members(members))
+
+
+def peak_of_refusing(file: io.BytesIO, words: str) -> int:
+    """Bytes that reading the file takes at most, until it is refused with these words."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(WeightsError, match=words) as refused:
+            read_weights(file)
+        assert len(str(refused.value)) < 1000
+        assert str(refused.value).isprintable()
+        assert "zip" not in str(refused.value)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def deflated(
+    members: dict[str, bytes],
+    method: int = zipfile.ZIP_DEFLATED,
+    says: dict[str, int] | None = None,
+) -> bytes:
+    """An archive; its list of members says that some unpack to these numbers of bytes."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", method) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+        for name, size in (says or {}).items():
+            archive.getinfo(name).file_size = size
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", ["metadata.json", "weights.npy"])
+def test_what_unpacks_to_more_than_weights_have_is_not_unpacked(name):
+    members = members_of(WHOLE)
+    bomb = {**members, name: bytes(2**27)}
+    honest = io.BytesIO(deflated(bomb))
+    assert peak_of_refusing(honest, f"{name} has 134217728 bytes") < 2**22
+    lying = io.BytesIO(deflated(bomb, says={name: len(members[name])}))
+    assert peak_of_refusing(lying, "Bad CRC") < 2**22
+
+
+def test_other_ways_of_packing_are_refused():
+    for method in (zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA):  # unpack without a bound
+        packed = deflated(members_of(WHOLE), method)
+        assert peak_of_refusing(io.BytesIO(packed), "is packed by method") < 2**20
+
+
+def test_an_archive_of_many_members_is_not_listed():
+    many = {f"{number}": b"" for number in range(20_000)}
+    archive = deflated(members_of(WHOLE) | many)
+    assert peak_of_refusing(io.BytesIO(archive), "more than 16 members") < 2 * len(archive)
+
+
+def test_a_file_larger_than_weights_are_is_not_read_to_its_end(monkeypatch):
+    monkeypatch.setattr(weights_module, "MAX_BYTES", 1000)
+    monkeypatch.setattr(weights_module, "MAX_METADATA_BYTES", 1000)
+    assert peak_of_refusing(io.BytesIO(bytes(10**6)), "more than 2000 bytes") < 10**5
+
+
+def test_what_is_no_ordinary_file_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(WeightsError, match="pipe: no ordinary file"):
+        load_weights(tmp_path / "pipe")
+
+
+HUGE = 10**9
+TILING = json.loads(members_of(WHOLE)["metadata.json"])["tiling"]
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"num_keepers": HUGE},
+        {"num_takers": HUGE},
+        {"num_keepers": 12},
+        {"num_keepers": 2.0},
+        {"num_keepers": 10**4000},
+        {"episodes": 2**63},
+        {"seed": 10**4000},
+        {"format_version": 10**4000},
+        {"field_length": 1e300},
+        {"hours": 10**4000},
+        {"tiling": TILING | {"widths": [1e-300] * 7}},
+        {"tiling": TILING | {"highs": [1e300] * 7}},
+        {"tiling": TILING | {"lows": [-1e300] * 7}},
+        {"tiling": TILING | {"widths": [True] * 7}},
+        {"tiling": TILING | {"feature_names": ["\x1b[31m" * 1000] * 7}},
+        {"player": "\x1b]0;owned\x07keeper_1"},
+        {"player": "keeper_1\nkeeper_2"},
+        {"player": "../../keeper_1"},
+        {"player": "..\\keeper_1"},
+        {"player": "keeper_\u202e1"},
+        {"player": "k" * 100_000},
+        {"created_by": "\x1b[2J"},
+        {"code_version": "1\x00"},
+        {"ordering": "\x1b[2J" * 1000},
+        {"role": "\x1b[2J" * 1000},
+        {"action_names": ["\x1b[2J" * 1000]},
+        {"\x1b[2J" * 1000: 1},
+        {"sarsa": {"alpha": "\x1b[2J" * 1000}},
+        {"sarsa": {"\x1b[2J" * 1000: 1}},
+    ],
+)
+def test_numbers_and_texts_are_checked_before_anything_is_made_of_them(entry):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert peak_of_refusing(with_metadata(**entry), ".") < 2**22
+
+
+def test_the_greatest_teams_are_those_of_the_simulator():
+    assert weights_module.MAX_TEAM_SIZE == task.MAX_TEAM_SIZE
+    assert weights_module.MAX_FIELD_SIDE == task.MAX_FIELD_SIDE
+    side = task.MAX_FIELD_SIDE
+    largest = make_tiling(Role.KEEPER, 11, 11, side, side)
+    assert 4 * 8 * np.prod(largest.weights_shape(11)) < weights_module.MAX_BYTES
+
+
+def test_weights_of_a_size_that_nobody_learns_are_refused():
+    for value in (1e308, -1e308, 2e9):
+        values = make_weights().values.copy()
+        values[1, 2, 3, 4] = value
+        with pytest.raises(WeightsError, match=r"not all finite and within \+-1e\+09"):
+            make_weights(values=values)
+    assert make_weights(values=np.full_like(make_weights().values, 1e9)).values.max() == 1e9
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])

@@ -5,18 +5,14 @@ array (num_actions, num_features, num_tiles, num_tilings) of float64, and `metad
 `LearnedWeights` says beside it. Any program reads it, `numpy.load` and `unzip -p` among them; no
 member is a pickle, and none is read as one.
 
-A file is written beside its place and then moved there in one step, so that whoever is killed
-while writing leaves the old file or the new one, never half of one.
+Files come from anywhere, so reading one believes nothing: the bytes that are read and unpacked are
+bounded, numbers are checked before anything is sized by them, texts are one printable line.
 """
 
-import contextlib
 import io
 import json
 import math
-import os
-import secrets
 import zipfile
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Final
@@ -25,16 +21,29 @@ import numpy as np
 
 from keepaway_agent.actions import Role, action_names
 from keepaway_agent.errors import WeightsError
+from keepaway_agent.files import moved_into_place
 from keepaway_agent.learning.cmac import NUM_TILINGS, Tiling
 from keepaway_agent.learning.features import ORDERINGS, feature_names
 from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.texts import one_line, shown
 
 FORMAT: Final = "keepaway-weights"
 FORMAT_VERSION: Final = 1
 HOURS_PER_CYCLE: Final = 0.1 / 3600
 """Simulated time is counted in cycles of 0.1 s and told in hours."""
-MAX_BYTES: Final = 2**28
-"""The largest member that is read; eleven against eleven on 100 m x 100 m takes a tenth of it."""
+MAX_BYTES: Final = 2**26
+"""The largest array that is read; eleven against eleven on 100 m x 100 m takes a fifth of it."""
+MAX_METADATA_BYTES: Final = 2**20
+MAX_MEMBERS: Final = 16
+"""Members that an archive may have; what others than the two say is not read."""
+MAX_TEAM_SIZE: Final = 11
+"""Players of a team; the simulator knows no larger one."""
+MAX_FIELD_SIDE: Final = 100.0
+"""Length and width of a field [m]; the simulator knows no larger one."""
+MAX_WEIGHT: Final = 1e9
+"""Greatest size of a weight [cycles]; learned ones are smaller than the longest episode."""
+MAX_COUNT: Final = 2**63 - 1
+"""Greatest number of episodes, and greatest seed: those of a ROS parameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +51,8 @@ class LearnedWeights:
     """The weights of one player and what they mean.
 
     Raises:
-        WeightsError: weights that do not fit what is said about them, or are not finite.
+        WeightsError: weights that do not fit what is said about them, or of a size that nobody
+            learns; a number or text outside its range.
     """
 
     values: np.ndarray  # (num_actions, num_features, num_tiles, num_tilings) float64
@@ -66,7 +76,7 @@ class LearnedWeights:
         names = feature_names(self.role, self.num_keepers, self.num_takers)
         if self.tiling.feature_names != names:
             raise WeightsError(
-                f"state variables {', '.join(self.tiling.feature_names)}:"
+                f"state variables {shown(', '.join(self.tiling.feature_names))}:"
                 f" a {self.role.name.lower()} in {self.task} has {', '.join(names)}"
             )
         expected = self.tiling.weights_shape(len(self.action_names))
@@ -74,8 +84,10 @@ class LearnedWeights:
             raise WeightsError(
                 f"weights of shape {self.values.shape}: {self.task} with these tiles has {expected}"
             )
-        if self.values.dtype != np.float64 or not np.isfinite(self.values).all():
-            raise WeightsError(f"weights of type {self.values.dtype} that are not all finite")
+        if self.values.dtype != np.float64:
+            raise WeightsError(f"weights of type {self.values.dtype}, not of float64")
+        if not np.abs(self.values).max() <= MAX_WEIGHT:  # nor is NaN
+            raise WeightsError(f"weights that are not all finite and within +-{MAX_WEIGHT:g}")
 
     @property
     def task(self) -> str:
@@ -133,9 +145,11 @@ def save_weights(path: Path, weights: LearnedWeights, overwrite: bool = False) -
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with _moved_into_place(path, overwrite) as file:
+        with moved_into_place(path, overwrite) as file:
             write_weights(file, weights)
     except OSError as error:
+        if isinstance(error, FileExistsError) and path.exists():  # and not a folder's in the way
+            raise WeightsError(f"{path} is there already: overwrite it or name another") from error
         raise WeightsError(f"{path} cannot be written: {error}") from error
 
 
@@ -159,6 +173,8 @@ def load_weights(path: Path) -> LearnedWeights:
             parts do not fit together.
     """
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise WeightsError("no ordinary file")  # a pipe may never end
         with path.open("rb") as file:
             return read_weights(file)
     except WeightsError as error:
@@ -170,15 +186,16 @@ def load_weights(path: Path) -> LearnedWeights:
 def read_weights(file: BinaryIO) -> LearnedWeights:
     """Read a weights file from an open one; errors as in `load_weights`."""
     try:
-        with zipfile.ZipFile(file) as archive:
-            metadata = json.loads(_member(archive, "metadata.json"), parse_constant=_no_constant)
+        with zipfile.ZipFile(_bounded(file)) as archive:
+            packed = _member(archive, "metadata.json", MAX_METADATA_BYTES)
+            metadata = json.loads(packed, parse_constant=_no_constant)
             _check_version(metadata)
-            values = _read_array(_member(archive, "weights.npy"))
+            values = _read_array(_member(archive, "weights.npy", MAX_BYTES))
             return from_metadata(metadata, values)
     except (WeightsError, MemoryError):
         raise
     except Exception as error:  # a stranger's bytes may break a reader in any way
-        raise WeightsError(f"not a whole weights file ({error!r})") from error
+        raise WeightsError(f"not a whole weights file ({shown(error)})") from error
 
 
 def to_metadata(weights: LearnedWeights) -> dict[str, Any]:
@@ -210,29 +227,50 @@ def from_metadata(metadata: dict[str, Any], values: np.ndarray) -> LearnedWeight
         sarsa=SarsaConfig(**rest.pop("sarsa")),
         **rest,
     )
-    expected = json.loads(json.dumps(to_metadata(weights)))
+    expected = json.loads(json.dumps(to_metadata(weights), allow_nan=False))
     for name in expected:
         if metadata[name] != expected[name]:
             raise WeightsError(
-                f"{name}={metadata[name]}: with the rest of it goes {expected[name]}"
+                f"{name}={shown(metadata[name])}: with the rest of it goes {shown(expected[name])}"
             )
     return weights
 
 
 def _check_plain_values(weights: LearnedWeights) -> None:
-    for name, least in (("num_keepers", 2), ("num_takers", 1), ("episodes", 0), ("seed", 0)):
+    for name, least, most in (
+        ("num_keepers", 2, MAX_TEAM_SIZE),
+        ("num_takers", 1, MAX_TEAM_SIZE),
+        ("episodes", 0, MAX_COUNT),
+        ("seed", 0, MAX_COUNT),
+    ):
         value = getattr(weights, name)
-        if type(value) is not int or value < least:
-            raise WeightsError(f"{name}={value!r}: a whole number from {least} on is needed")
-    for name in ("field_length", "field_width", "hours"):
-        value = getattr(weights, name)
-        if type(value) not in (int, float) or not (math.isfinite(value) and value >= 0):
-            raise WeightsError(f"{name}={value!r}: a finite number is needed")
+        if type(value) is not int or not least <= value <= most:
+            raise WeightsError(f"{name}={shown(value)}: a whole number from {least} to {most}")
+    for name, greatest in (
+        ("field_length", MAX_FIELD_SIDE),
+        ("field_width", MAX_FIELD_SIDE),
+        ("hours", MAX_COUNT * HOURS_PER_CYCLE),
+    ):
+        _check_number(name, getattr(weights, name), 0.0, greatest)
+    for name in ("lows", "highs", "widths"):
+        for value in getattr(weights.tiling, name):
+            _check_number(name, value, 1e-3 if name == "widths" else 0.0, MAX_FIELD_SIDE * 2)
     for name in ("player", "code_version", "created_by"):
-        if not isinstance(getattr(weights, name), str):
-            raise WeightsError(f"{name}={getattr(weights, name)!r}: a text is needed")
-    if weights.ordering not in ORDERINGS:
-        raise WeightsError(f"ordering={weights.ordering!r}: one of {', '.join(ORDERINGS)}")
+        _check_text(name, getattr(weights, name))
+    if {"/", "\\"} & set(weights.player):
+        raise WeightsError(f"player={shown(weights.player)}: a name without path separators")
+    if not isinstance(weights.ordering, str) or weights.ordering not in ORDERINGS:
+        raise WeightsError(f"ordering={shown(weights.ordering)}: one of {', '.join(ORDERINGS)}")
+
+
+def _check_number(name: str, value: Any, least: float, most: float) -> None:
+    if type(value) not in (int, float) or not least <= value <= most:
+        raise WeightsError(f"{name}={shown(value)}: a number from {least:g} to {most:g}")
+
+
+def _check_text(name: str, value: object) -> None:
+    if not isinstance(value, str) or value != one_line(value):
+        raise WeightsError(f"{name}={shown(value)}: a printable text of one line")
 
 
 def _check_version(metadata: Any) -> None:
@@ -240,18 +278,34 @@ def _check_version(metadata: Any) -> None:
         raise WeightsError("not a weights file: its metadata do not say so")
     version = metadata.get("format_version")
     if type(version) is not int or version < 1:
-        raise WeightsError(f"format_version={version!r}: there is no such version")
+        raise WeightsError(f"format_version={shown(version)}: there is no such version")
     if version > FORMAT_VERSION:
         raise WeightsError(
-            f"format version {version}, but this program reads up to {FORMAT_VERSION}: update it"
+            f"format version {shown(version)}, but this program reads up to {FORMAT_VERSION}:"
+            " update it"
         )
 
 
-def _member(archive: zipfile.ZipFile, name: str) -> bytes:
-    size = archive.getinfo(name).file_size
-    if size > MAX_BYTES:
-        raise WeightsError(f"{name} has {size} bytes: more than {MAX_BYTES} are not read")
-    return archive.read(name)
+def _bounded(file: BinaryIO) -> BinaryIO:
+    """A file's bytes, if they are no more than a weights file's can be."""
+    file.seek(0)
+    data = file.read(MAX_BYTES + MAX_METADATA_BYTES)
+    if file.read(1):
+        raise WeightsError(f"more than {len(data)} bytes, which no weights file has")
+    if data.count(b"PK\1\2") > MAX_MEMBERS:  # so begins an entry of an archive's list of members
+        raise WeightsError(f"an archive of more than {MAX_MEMBERS} members")
+    return io.BytesIO(data)
+
+
+def _member(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
+    """A member's bytes, if they are no more than `most`, whatever they would unpack to."""
+    entry = archive.getinfo(name)
+    if entry.file_size > most:
+        raise WeightsError(f"{name} has {entry.file_size} bytes: more than {most} are not read")
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise WeightsError(f"{name} is packed by method {entry.compress_type}: use deflate")
+    with archive.open(entry) as member:
+        return member.read(entry.file_size)  # and unpacks no more, where `read()` unpacks it all
 
 
 def _read_array(data: bytes) -> np.ndarray:
@@ -268,22 +322,3 @@ def _read_array(data: bytes) -> np.ndarray:
 
 def _no_constant(name: str) -> None:
     raise WeightsError(f"{name} in the metadata")
-
-
-@contextlib.contextmanager
-def _moved_into_place(path: Path, overwrite: bool) -> Iterator[BinaryIO]:
-    """A file to write that appears at `path` once it is whole and on the disk."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
-    try:
-        with beside.open("xb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        if overwrite:
-            beside.replace(path)
-        else:
-            path.hardlink_to(beside)  # unlike a move this fails if there is a file
-    except FileExistsError as error:
-        raise WeightsError(f"{path} is there already: overwrite it or name another") from error
-    finally:
-        beside.unlink(missing_ok=True)

@@ -16,6 +16,7 @@ import numpy as np
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
+from keepaway_agent.texts import one_line
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import TrialResult
 from keepaway_sim.version import code_version
@@ -138,7 +139,7 @@ class TrainingFolder:
                 seed=training.seed,
                 player=name,
                 code_version=code_version(),
-                created_by=self._command,
+                created_by=one_line(self._command),
             )
 
 

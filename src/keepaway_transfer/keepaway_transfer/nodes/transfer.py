@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import load_weights, save_weights
+from keepaway_agent.texts import one_line
 from keepaway_msgs.srv import ApplyRho
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.mapping import load_mapping
@@ -61,7 +62,7 @@ def apply(request: ApplyRho.Request) -> tuple[str, str]:
     known = load_weights(source)
     settings = Settings(request.target_task, variant, mapping, request.seed)
     carried = dataclasses.replace(
-        transferred(known, settings), created_by=f"transfer node: {variant} of {source}"
+        transferred(known, settings), created_by=one_line(f"transfer node: {variant} of {source}")
     )
     target = Path(request.target_path or source.with_stem(f"{source.stem}_{carried.task}"))
     save_weights(target, carried)
