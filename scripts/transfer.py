@@ -2,11 +2,14 @@
 
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --out start.npz
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 5v4 --out start.npz
+    .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --variant rho_shape@5 --out s.npz
+    .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --variant optimistic@5 --out o.npz
     .venv/bin/python scripts/transfer.py mapping 3v2 4v3 > mine.toml
     .venv/bin/python scripts/transfer.py apply keeper_1.npz 4v3 --mapping mine.toml --out b.npz
     .venv/bin/python scripts/transfer.py node --ros-args -r __ns:=/match_2
 
-Several tasks are a chain: rho from each to the next.
+Several tasks are a chain: rho from each to the next. A level in seconds behind a variant's name is
+what actions are worth on average: rho_shape@5 keeps how 3v2 tells states apart and nothing else.
 """
 
 import argparse
@@ -22,7 +25,8 @@ from keepaway_agent.texts import one_line
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import load_mapping
-from keepaway_transfer.rho import VARIANTS, Transfer, transferred
+from keepaway_transfer.rho import Transfer, transferred
+from keepaway_transfer.variants import VARIANTS
 
 
 def main() -> int:
@@ -87,7 +91,9 @@ def _parse() -> argparse.Namespace:
     node.add_argument("ros", nargs=argparse.REMAINDER, help="--ros-args and what follows it")
     node.set_defaults(run=_node)
     for command in (apply, mapping):
-        command.add_argument("--variant", choices=sorted(VARIANTS), default="rho")
+        command.add_argument(
+            "--variant", default="rho", metavar="NAME[@SECONDS]", help=f"{', '.join(VARIANTS)}"
+        )
         command.add_argument("--seed", type=int, default=0, help="of the shuffled mapping")
     return parser.parse_args()
 

@@ -55,3 +55,10 @@ def test_a_file_in_the_way_is_refused_in_one_line(keeper):
     assert done.returncode == 1
     assert done.stderr.startswith("transfer: ")
     assert "overwrite" in done.stderr
+
+
+def test_a_level_is_set_behind_the_variants_name(keeper, tmp_path):
+    out = tmp_path / "start.npz"
+    transfer("apply", keeper, "4v3", "--variant", "optimistic@5", "--out", out)
+    (weight,) = np.unique(load_weights(out).values)
+    assert weight * 19 * 32 / 10 == pytest.approx(5.0)  # all active tiles, in seconds

@@ -20,27 +20,9 @@ from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES, InterTaskMapping, actions, state_variables
+from keepaway_transfer.variants import RHO, Variant, variant_of
 
 Weights = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Variant:
-    """A way to carry weights over: the rule of its mapping and what is done to the weights."""
-
-    rule: str  # of MAPPING_RULES
-    averaged: bool = False  # weights still zero take the mean of the others
-    rescaled: bool = False  # action values keep the scale they have in the source task
-
-
-VARIANTS = {
-    "rho": Variant("rho"),  # the paper's
-    "rho_modified": Variant("rho_modified"),  # its sensitivity test
-    "rho_averaged": Variant("rho", averaged=True),  # Taylor, Stone & Liu 2007
-    "rescaled": Variant("rho", rescaled=True),
-    "partial": Variant("partial"),
-    "shuffled": Variant("shuffled"),  # a negative control
-}
 
 
 @dataclass(frozen=True)
@@ -52,14 +34,13 @@ class Transfer:
     """
 
     target: str  # task, "4v3"
-    variant: str = "rho"  # a name in VARIANTS
+    variant: str = "rho"  # as `variants.variant_of` reads it: "rho", "optimistic@5"
     mapping: InterTaskMapping | None = None  # one's own, instead of the variant's
     seed: int = 0  # of the shuffled mapping
     widths: str = ""  # profile of the target's tile widths; empty: the source's
 
     def __post_init__(self) -> None:
-        if self.variant not in VARIANTS:
-            raise MappingError(f"variant={self.variant!r}: choose one of {', '.join(VARIANTS)}")
+        variant_of(self.variant)  # refuse an unknown one now
 
     def mapping_from(self, source: str) -> InterTaskMapping:
         """The mapping from this source task.
@@ -68,7 +49,7 @@ class Transfer:
             MappingError: one's own mapping is between other tasks, or there is no rule.
         """
         if self.mapping is None:
-            rule = MAPPING_RULES[VARIANTS[self.variant].rule]
+            rule = MAPPING_RULES[variant_of(self.variant).rule]
             return rule(source, self.target, np.random.default_rng(self.seed))
         if (self.mapping.source, self.mapping.target) != (source, self.target):
             raise MappingError(
@@ -98,15 +79,9 @@ def transferred(source: LearnedWeights, transfer: Transfer) -> LearnedWeights:
         source.field_width,
         transfer.widths or _profile(source),
     )
-    variant = VARIANTS[transfer.variant]
-    values = rho(
-        source.values,
-        source.tiling,
-        tiling,
-        transfer.mapping_from(source.task),
-        averaged=variant.averaged,
-        rescaled=variant.rescaled,
-    )
+    mapping = transfer.mapping_from(source.task)
+    variant = variant_of(transfer.variant)
+    values = rho(source.values, source.tiling, tiling, mapping, variant)
     return replace(
         source,
         values=values,
@@ -122,9 +97,7 @@ def rho(
     source: Tiling,
     target: Tiling,
     mapping: InterTaskMapping,
-    *,
-    averaged: bool = False,
-    rescaled: bool = False,
+    variant: Variant = RHO,
 ) -> Weights:
     """Weights for the target task from those of a keeper of the source task.
 
@@ -133,9 +106,7 @@ def rho(
         source: how the source's state variables are tiled.
         target: how the target's are.
         mapping: which source variable and action stand for each of the target.
-        averaged: let every weight that is still zero take the mean of the non-zero ones.
-        rescaled: multiply by the number of source variables over that of mapped target variables,
-            because an action's value is a sum over state variables.
+        variant: what is done to the copied weights; the rule of its mapping is not looked at.
 
     Returns:
         (num_actions, num_features, num_tiles, num_tilings) of the target.
@@ -152,11 +123,8 @@ def rho(
         for action, source_action in enumerate(mapping.action_indices):
             if of_source >= 0 and source_action >= 0:
                 flat[action, variable] = known[source_action, of_source, tiles]
-    if rescaled:
-        carried *= source.num_features / sum(index >= 0 for index in mapping.variable_indices)
-    if averaged and carried.any():
-        carried[carried == 0] = carried[carried != 0].mean()
-    return carried
+    mapped = sum(index >= 0 for index in mapping.variable_indices)
+    return variant.changed(carried, source.num_features / mapped if mapped else 1.0)
 
 
 def nearest_tiles(

@@ -35,7 +35,9 @@ def ask(graph: Graph, source: Path) -> Callable[..., Any]:
     return call
 
 
-@pytest.mark.parametrize("variant", ["rho", "rho_modified", "shuffled"])
+@pytest.mark.parametrize(
+    "variant", ["rho", "rho_modified", "shuffled", "rho_shape@5", "optimistic"]
+)
 def test_it_writes_what_rho_gives(ask: Callable[..., Any], source: Path, variant: str) -> None:
     done = ask(variant=variant, seed=3)
     assert done.success, done.message

@@ -120,3 +120,47 @@ def test_shuffled_trials_have_shuffles_of_their_own(runs):
     play(study, [("shuffled", 0), ("shuffled", 1)])
     first, second = [result.trial for task, result in runs if task == "3v2"][:2]
     assert np.any(first.keeper_weights != second.keeper_weights)
+
+
+def test_an_optimistic_row_starts_at_a_constant_of_its_level(runs):
+    rows = (Row("0"), Row("high", variant="optimistic@5"))
+    play(dataclasses.replace(TINY, rows=rows), [("high", 0)])
+    (weight,) = np.unique(runs[0][1].trial.keeper_weights)
+    assert weight * 13 * 32 / 10 == pytest.approx(5.0)  # all active tiles, in seconds
+
+
+def test_a_row_plays_with_its_own_tile_widths(runs):
+    rows = (Row("0"), Row("wide", (Stage("2v1", 4),), widths="framework"))
+    play(dataclasses.replace(TINY, target="4v3", rows=rows), [("0", 0), ("wide", 0)])
+    shapes = [result.keeper_weights.shape[1:] for task, result in runs if task == "4v3"]
+    expected = [
+        make_tiling(Role.KEEPER, 4, 3, profile=profile).weights_shape(4)
+        for profile in ("default", "framework")
+    ]
+    assert shapes == expected * 2  # learning, then greedy
+
+
+def test_rows_that_start_alike_give_equal_trials_in_any_study_whatever_they_are_called():
+    rows = (Row("scratch"), Row("four", (Stage("2v1", 4),)))
+    other = dataclasses.replace(TINY, name="other", rows=rows, references=("scratch",))
+    for mine, theirs in (("0", "scratch"), ("4", "four")):
+        (first,), (second,) = play(TINY, [(mine, 1)]), play(other, [(theirs, 1)])
+        assert (first.cycles, first.greedy_cycles) == (second.cycles, second.greedy_cycles)
+
+
+def test_rows_of_one_start_take_their_source_from_one_run_and_go_on_with_seeds_of_their_own(runs):
+    rows = (Row("0"), Row("a", (Stage("2v1", 4),)), Row("b", (Stage("2v1", 4),), "rescaled"))
+    play(dataclasses.replace(TINY, rows=rows), [("a", 0), ("b", 0)])
+    assert [task for task, _ in runs].count("2v1") == 1
+    first, second = [result.trial.seed.spawn_key for task, result in runs if task == "3v2"][:2]
+    assert first != second
+
+
+def test_trials_of_one_number_have_one_seed_where_the_study_says_so(runs):
+    play(dataclasses.replace(TINY, shared_seeds=True), [("0", 0), ("4", 0), ("0", 1)])
+    seeds = {
+        result.trial.label.row.name + str(result.trial.label.number): result.trial.seed.spawn_key
+        for task, result in runs
+        if task == "3v2" and result.trial.keeper_policy == "learn"
+    }
+    assert seeds["00"] == seeds["40"] != seeds["01"]

@@ -67,6 +67,30 @@ def test_the_number_of_trials_is_no_setting_that_decides_what_a_trial_gives():
     assert study_from(PLAIN).settings != study_from({**PLAIN, "threshold": 8.0}).settings
 
 
+SCRATCH, OTHER = Row("0"), Row("1", variant="optimistic@5")
+AFTER_10, SAME = Row("2", (Stage("3v2", 10),)), Row("3", (Stage("3v2", 10),), "rescaled")
+AFTER_20 = Row("4", (Stage("3v2", 20),))
+
+
+@pytest.mark.parametrize(
+    ("settings", "first", "second", "expected"),
+    [
+        ({}, SCRATCH, OTHER, False),
+        ({}, SCRATCH, AFTER_10, False),
+        ({}, AFTER_10, SAME, True),
+        ({}, AFTER_10, AFTER_20, False),
+        ({"shared_sources": True}, AFTER_10, AFTER_20, True),
+        ({"shared_sources": True}, SCRATCH, AFTER_10, False),
+        ({"shared_seeds": True}, SCRATCH, OTHER, True),
+    ],
+)
+def test_rows_are_paired_where_trials_of_one_number_share_a_source_or_a_seed(
+    settings, first, second, expected
+):
+    study = study_from({**PLAIN, **settings})
+    assert study.are_paired(first, second) == study.are_paired(second, first) == expected
+
+
 def test_constants_of_world_and_learner_are_changed_by_name():
     study = study_from({**PLAIN, "world": {"kick_rand": 0.1}, "learner": {"lambda_": 0.5}})
     assert study.world_settings.physics.kick_rand == 0.1
@@ -82,6 +106,10 @@ def test_constants_of_world_and_learner_are_changed_by_name():
         ({"references": []}, "references=[]"),
         ({"rows": [{"name": "scratch"}] * 2}, "two rows of one name"),
         ({"rows": [{"name": "scratch", "variant": "rho3"}]}, "variant='rho3'"),
+        ({"rows": [{"name": "scratch", "variant": "optimistic"}]},
+         "row scratch: variant='optimistic' carries what was learned before"),
+        ({"rows": [{"name": "scratch", "variant": "rho@5"}]}, "variant='rho@5' carries"),
+        ({"rows": [{"name": "scratch", "widths": "broad"}]}, "row scratch: widths='broad'"),
         ({"rows": [{"name": "scratch", "stages": [{"task": "5v4", "episodes": 1}]}]},
          "5v4 is no source for 4v3"),
         ({"rows": [{"name": "scratch", "stages": [{"task": "3v2", "episodes": 0}]}]}, "episodes=0"),

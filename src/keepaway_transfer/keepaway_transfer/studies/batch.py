@@ -3,6 +3,12 @@
 A trial trains keepers on its row's source stages one after the other. After each, one keeper is
 taken at random, and rho carries its weights into all keepers of the next task; the target task is
 the last. What a trial gives depends on the study's settings, its row and its number alone.
+
+The seed plan: a run's random numbers follow from the study's seed, from what the run is (the task
+it plays and all that was learned before, `study.Row.origin`) and from the trial's number, and from
+nothing else. So rows that start alike give the same trials in any two studies of one seed and one
+world, whatever the rows are called; rows that start otherwise are independent of one another,
+unless the study says that they share their sources or their seeds.
 """
 
 import zlib
@@ -19,13 +25,14 @@ from keepaway_agent.training.trial import Trial as Run
 from keepaway_sim.version import code_version
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer.reports.metrics import SECONDS_PER_HOUR
-from keepaway_transfer.rho import VARIANTS, Transfer, rho
+from keepaway_transfer.rho import Transfer, rho
 from keepaway_transfer.studies.experiment import Key
 from keepaway_transfer.studies.results import SourceRun, Trial
 from keepaway_transfer.studies.study import Row, Study
+from keepaway_transfer.variants import variant_of
 
 CYCLES_PER_HOUR = SECONDS_PER_HOUR / CYCLE_TIME
-GREEDY, CHOICE, SHUFFLE = 100, 101, 102  # seeds of what is no stage: after any number of stages
+GREEDY, CHOICE, SHUFFLE, TARGET = 100, 101, 102, 103  # seeds of what is no source stage
 
 
 @dataclass
@@ -44,7 +51,7 @@ class _Life:
 def play(study: Study, keys: Sequence[Key]) -> list[Trial]:
     """Play these trials to their end; the results are in the order of the keys."""
     rows = {row.name: row for row in study.rows}
-    lives = [_Life(rows[name], number) for name, number in keys]
+    lives = [_Life(rows[name], number, _constant(study, rows[name])) for name, number in keys]
     for stage in range(max((len(life.row.stages) for life in lives), default=0)):
         _train_sources(study, [x for x in lives if len(x.row.stages) > stage], stage)
     _train_target(study, lives)
@@ -63,26 +70,35 @@ def play(study: Study, keys: Sequence[Key]) -> list[Trial]:
     ]
 
 
+def _constant(study: Study, row: Row) -> np.ndarray | None:
+    """What a row that learns from no source starts with; None from scratch."""
+    if row.stages or row.is_scratch:
+        return None
+    config = _config(study, study.target, row.widths)
+    nothing = np.zeros(config.tiling(Role.KEEPER).weights_shape(config.task.num_keepers))
+    return variant_of(row.variant).changed(nothing, 1.0)
+
+
 def _train_sources(study: Study, lives: Sequence[_Life], stage: int) -> None:
     """Train a source stage of all lives, and carry what was learned to their next task."""
-    by_run: dict[tuple[str, str, int], list[_Life]] = defaultdict(list)
+    by_run: dict[tuple[str, str, str, int], list[_Life]] = defaultdict(list)
     for life in lives:
-        name = _source_name(study, life.row, stage)
-        by_run[life.row.stages[stage].task, name, life.number].append(life)
-    runs: dict[str, list[Run]] = defaultdict(list)
+        task, name = life.row.stages[stage].task, study.source_name(life.row, stage)
+        by_run[task, life.row.widths, name, life.number].append(life)
+    runs: dict[tuple[str, str], list[Run]] = defaultdict(list)
     for label, sharing in by_run.items():
-        runs[label[0]].append(_source_run(study, label, sharing, stage))
-    for task, of_task in runs.items():
-        for result in _results(study, task, of_task):
+        runs[label[:2]].append(_source_run(study, label, sharing, stage))
+    for (task, widths), alike in runs.items():
+        for result in Trainer(_config(study, task, widths), len(alike)).run(alike):
             for life in by_run[result.trial.label]:
                 _carry(study, life, stage, result)
 
 
 def _source_run(
-    study: Study, label: tuple[str, str, int], lives: Sequence[_Life], stage: int
+    study: Study, label: tuple[str, str, str, int], lives: Sequence[_Life], stage: int
 ) -> Run:
     """The training that these lives share (or that one has for itself)."""
-    _, name, number = label
+    *_, name, number = label
     amounts = {life.row.stages[stage].episodes for life in lives}
     return Run(
         seed=_seed(study, name, number, stage),
@@ -95,7 +111,7 @@ def _source_run(
 
 def _carry(study: Study, life: _Life, stage: int, result: TrialResult) -> None:
     """Let a random keeper's weights, through rho, be what the next task starts with."""
-    task, name, number = result.trial.label
+    task, _, name, number = result.trial.label
     episodes = life.row.stages[stage].episodes
     keepers = result.snapshots[episodes]
     choice = np.random.default_rng(_seed(study, name, number, stage, CHOICE))
@@ -109,16 +125,15 @@ def _carry(study: Study, life: _Life, stage: int, result: TrialResult) -> None:
 def _through_rho(
     study: Study, life: _Life, source: str, target: str, weights: np.ndarray
 ) -> np.ndarray:
-    shuffle = _seed(study, life.row.name, life.number, SHUFFLE).generate_state(1)
-    transfer = Transfer(target, life.row.variant, seed=int(shuffle[0]))
-    variant = VARIANTS[life.row.variant]
+    row = life.row
+    shuffle = _seed(study, study.target_name(row), life.number, SHUFFLE).generate_state(1)
+    transfer = Transfer(target, row.variant, seed=int(shuffle[0]))
     return rho(
         weights,
-        _config(study, source).tiling(Role.KEEPER),
-        _config(study, target).tiling(Role.KEEPER),
+        _config(study, source, row.widths).tiling(Role.KEEPER),
+        _config(study, target, row.widths).tiling(Role.KEEPER),
         transfer.mapping_from(source),
-        averaged=variant.averaged,
-        rescaled=variant.rescaled,
+        variant_of(row.variant),
     )
 
 
@@ -131,16 +146,15 @@ def _train_target(study: Study, lives: Sequence[_Life]) -> None:
     )
     runs = [
         Run(
-            seed=_seed(study, life.row.name, life.number, len(life.row.stages)),
+            seed=_seed(study, study.target_name(life.row), life.number, TARGET),
             stop=stop,
             keeper_weights=life.weights,
             label=life,
         )
         for life in lives
     ]
-    for result in _results(study, study.target, runs):
-        life = result.trial.label
-        life.cycles, life.learned = tuple(result.durations.tolist()), result.keeper_weights
+    for life, result in _results(study, runs):
+        life.cycles, life.learned = _tuple(result.durations), result.keeper_weights
 
 
 def _play_greedily(study: Study, lives: Sequence[_Life]) -> None:
@@ -150,7 +164,7 @@ def _play_greedily(study: Study, lives: Sequence[_Life]) -> None:
     )
     runs = [
         Run(
-            seed=_seed(study, life.row.name, life.number, GREEDY),
+            seed=_seed(study, study.target_name(life.row), life.number, GREEDY),
             stop=stop,
             keeper_policy="greedy",
             keeper_weights=life.learned,
@@ -158,34 +172,36 @@ def _play_greedily(study: Study, lives: Sequence[_Life]) -> None:
         )
         for life in lives
     ]
-    for result in _results(study, study.target, runs):
-        result.trial.label.greedy_cycles = tuple(result.durations.tolist())
+    for life, result in _results(study, runs):
+        life.greedy_cycles = _tuple(result.durations)
 
 
-def _results(study: Study, task: str, runs: Sequence[Run]) -> Iterator[TrialResult]:
-    """Play runs of one task, all at once."""
-    return Trainer(_config(study, task), len(runs)).run(runs)
+def _results(study: Study, runs: Sequence[Run]) -> Iterator[tuple[_Life, TrialResult]]:
+    """Play runs of the target task, all of one tiling at once; each with the life it is of."""
+    by_widths: dict[str, list[Run]] = defaultdict(list)
+    for run in runs:
+        by_widths[run.label.row.widths].append(run)
+    for widths, alike in by_widths.items():
+        config = _config(study, study.target, widths)
+        for result in Trainer(config, len(alike)).run(alike):
+            yield result.trial.label, result
 
 
-def _config(study: Study, task: str) -> TrainerConfig:
+def _config(study: Study, task: str, widths: str) -> TrainerConfig:
     return TrainerConfig(
         task=study.task(task),
         world=study.world_settings,
         sarsa=study.sarsa,
         ordering=study.ordering,
-        tile_widths=study.widths,
+        tile_widths=widths or study.widths,
         shared=study.shared_keepers,
     )
 
 
-def _source_name(study: Study, row: Row, stage: int) -> str:
-    """What a source run is known by: its row, or what it learned before where rows share runs."""
-    if not study.shared_sources:
-        return row.name
-    before = "".join(f"{done.task} {done.episodes} {row.variant} " for done in row.stages[:stage])
-    return before + row.stages[stage].task
+def _tuple(durations: np.ndarray) -> tuple[int, ...]:
+    return tuple(durations.tolist())
 
 
 def _seed(study: Study, name: str, number: int, *what: int) -> np.random.SeedSequence:
-    """The seeds of one run: no other row, trial or stage of the study has the same."""
+    """The seeds of one run (see the seed plan above)."""
     return np.random.SeedSequence(study.seed, spawn_key=(zlib.crc32(name.encode()), number, *what))

@@ -5,7 +5,7 @@ a path to a file of the same form. Row `stages` say what a trial trains on befor
 no stages is training from scratch.
 
 >>> load_study("table2").rows[6]
-Row(name='1000', stages=(Stage(task='3v2', episodes=1000),), variant='rho')
+Row(name='1000', stages=(Stage(task='3v2', episodes=1000),), variant='rho', widths='')
 """
 
 import dataclasses
@@ -16,12 +16,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from keepaway_agent.learning.cmac import WIDTH_PROFILES
 from keepaway_agent.learning.sarsa import SarsaConfig
 from keepaway_sim.task import Task
 from keepaway_sim.world import config as world_config
 from keepaway_sim.world.config import Config
-from keepaway_transfer.errors import StudyError
-from keepaway_transfer.rho import VARIANTS
+from keepaway_transfer.errors import MappingError, StudyError
+from keepaway_transfer.variants import variant_of
 
 FOLDER = Path(__file__).parent
 
@@ -40,7 +41,26 @@ class Row:
 
     name: str
     stages: tuple[Stage, ...] = ()  # in order; the weights of one keeper go on to the next
-    variant: str = "rho"  # of rho.VARIANTS, between all stages
+    variant: str = "rho"  # as variants.variant_of reads it, between all stages
+    widths: str = ""  # profile of tile widths; empty: the study's
+
+    @property
+    def is_scratch(self) -> bool:
+        """Does it start with nothing?"""
+        return not self.stages and self.variant == "rho"
+
+    def origin(self, stages: int | None = None) -> str:
+        """What was done before a task, in words that rows of other names share: the seed plan's.
+
+        Args:
+            stages: how many of the row's stages count; all by default.
+
+        >>> Row("best", (Stage("3v2", 1000), Stage("4v3", 50)), "rescaled").origin()
+        '3v2 1000 rescaled 4v3 50 rescaled '
+        """
+        learned = self.stages if stages is None else self.stages[:stages]
+        before = "".join(f"{stage.task} {stage.episodes} {self.variant} " for stage in learned)
+        return before if self.stages or self.is_scratch else f"{self.variant} "
 
     @property
     def source_episodes(self) -> int:
@@ -67,7 +87,8 @@ class Study:
     min_hours: float = 0.0  # simulated, of the target task: go on to there after the threshold
     max_hours: float = 40.0  # simulated, of the target task: give up, the trial is censored
     greedy_episodes: int = 0  # played without learning or exploring after the target task
-    shared_sources: bool = False  # do rows share each trial's source run?
+    shared_sources: bool = False  # is a row's source run part of that of a row of more episodes?
+    shared_seeds: bool = False  # do trials of one number have one seed in the target task?
     field: str = "25x25"  # length x width [m]
     profile: str = "2005"  # of the world's constants
     world: Mapping[str, float] = dataclasses.field(
@@ -96,6 +117,23 @@ class Study:
     def sarsa(self) -> SarsaConfig:
         """How the keepers learn."""
         return SarsaConfig(**self.learner)
+
+    def are_paired(self, first: Row, second: Row) -> bool:
+        """Are these rows' trials of one number pairs: of one source run, or of one seed?"""
+        if self.shared_seeds:
+            return True
+        if not first.stages or not second.stages:
+            return False
+        return self.source_name(first, 0) == self.source_name(second, 0)
+
+    def source_name(self, row: Row, stage: int) -> str:
+        """What the run of this stage is known by: rows share runs of one name."""
+        before, itself = row.origin(stage), row.stages[stage]
+        return before + itself.task + ("" if self.shared_sources else f" {itself.episodes}")
+
+    def target_name(self, row: Row) -> str:
+        """What the runs of the target task are known by."""
+        return self.target if self.shared_seeds else f"{row.origin()}{self.target}{row.widths}"
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -164,9 +202,18 @@ def _check(study: Study) -> None:
 
 
 def _check_row(row: Row, study: Study) -> None:
-    if row.variant not in VARIANTS:
+    try:
+        variant = variant_of(row.variant)
+    except MappingError as error:
+        raise StudyError(f"row {row.name}: {error}") from error
+    if not row.stages and not row.is_scratch and not variant.needs_no_source:
         raise StudyError(
-            f"row {row.name}: variant={row.variant!r}: choose one of {', '.join(VARIANTS)}"
+            f"row {row.name}: variant={row.variant!r} carries what was learned before: give the"
+            " row stages, or let it start at a constant, like optimistic@5"
+        )
+    if row.widths and row.widths not in WIDTH_PROFILES:
+        raise StudyError(
+            f"row {row.name}: widths={row.widths!r}: choose one of {', '.join(WIDTH_PROFILES)}"
         )
     tasks = [study.task(stage.task) for stage in row.stages] + [study.task(study.target)]
     for smaller, larger in pairwise(tasks):
