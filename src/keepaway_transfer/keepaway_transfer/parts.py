@@ -94,7 +94,7 @@ def scaled(weights: Weights, level: float) -> Weights:
 
 def level_of(weights: Weights) -> float:
     """What an action is worth on average [s]: the value that the level alone gives it."""
-    return _mean_learned(weights) * NUM_TILINGS * weights.shape[1] * CYCLE_TIME
+    return float(_mean_learned(weights) * NUM_TILINGS * weights.shape[1] * CYCLE_TIME)
 
 
 def weight_of(level: float, num_features: int) -> float:
