@@ -1,7 +1,9 @@
 """A study is run to its end on any executor, whatever interrupts it."""
 
 import dataclasses
-from concurrent.futures import ThreadPoolExecutor
+import gc
+import weakref
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
 from hypothesis import given
@@ -74,6 +76,28 @@ def test_a_run_that_was_interrupted_goes_on_and_repeats_nothing(tmp_path):
     assert set(read_results(tmp_path / "cut").trials) == set(
         read_results(tmp_path / "whole").trials
     )
+
+
+def test_a_run_keeps_no_trial_that_is_on_the_disk(tmp_path):
+    kept: list[weakref.ref[Trial]] = []
+
+    def remembered(study, keys):
+        trials = play(study, keys)
+        kept.extend(weakref.ref(trial) for trial in trials)
+        return trials
+
+    many = dataclasses.replace(TINY, trials=100)
+    with (
+        ThreadPoolExecutor(1) as executor,
+        open_results(tmp_path, many, command="x", code_version="v1") as results,
+    ):
+        for count, _ in enumerate(run(many, results, executor, remembered, batch=1)):
+            if count == 250:
+                wait([executor.submit(int)])  # everything has been played
+                gc.collect()
+                unread = sum(trial() is not None for trial in kept)
+                assert unread <= 300 - count
+    assert len(kept) == 300
 
 
 def test_more_trials_are_added_to_a_study_that_is_done(tmp_path):

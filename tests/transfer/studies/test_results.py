@@ -1,6 +1,7 @@
 """Results land trial by trial, survive a kill, and are never mixed or overwritten."""
 
 import dataclasses
+import fcntl
 import gzip
 import multiprocessing
 
@@ -111,6 +112,62 @@ def test_packed_trials_are_read(tmp_path):
     (tmp_path / "trials.jsonl.gz").write_bytes(gzip.compress(plain.read_bytes()))
     plain.unlink()
     assert read_results(tmp_path).trials == (trial(0), trial(1))
+
+
+def test_trials_that_are_added_to_packed_ones_are_read_with_them(tmp_path):
+    append(tmp_path, 0, 1)
+    plain = tmp_path / "trials.jsonl"
+    (tmp_path / "trials.jsonl.gz").write_bytes(gzip.compress(plain.read_bytes()))
+    with opened(tmp_path, resume=True) as results:  # packed, and the plain file kept (gzip -k)
+        assert results.done == {("4", 0), ("4", 1)}
+    plain.unlink()
+    with opened(tmp_path, resume=True) as results:
+        assert results.done == {("4", 0), ("4", 1)}
+        results.append(trial(2))
+    assert read_results(tmp_path).trials == (trial(0), trial(1), trial(2))
+    with opened(tmp_path, resume=True) as results:
+        assert results.done == {("4", 0), ("4", 1), ("4", 2)}
+
+
+def _begin(folder, threshold, barrier, answers):
+    barrier.wait()
+    try:
+        with opened(folder, study=dataclasses.replace(STUDY, threshold=threshold)) as results:
+            answers.put(threshold)
+            results.append(trial(0))
+            barrier.wait()  # until the other one was refused
+    except StudyError as error:
+        answers.put(str(error))
+        barrier.wait()
+
+
+def test_of_two_studies_that_begin_one_folder_at_once_one_is_refused(tmp_path):
+    context = multiprocessing.get_context("spawn")
+    barrier, answers = context.Barrier(2), context.Queue()
+    others = [
+        context.Process(target=_begin, args=(tmp_path / "out", threshold, barrier, answers))
+        for threshold in (5.5, 6.5)
+    ]
+    for other in others:
+        other.start()
+    said = [answers.get(timeout=120) for _ in others]
+    for other in others:
+        other.join()
+    (began,) = (each for each in said if isinstance(each, float))
+    assert any("another process" in str(each) or "has results" in str(each) for each in said)
+    results = read_results(tmp_path / "out")
+    assert results.study.threshold == began
+    assert results.trials == (trial(0),)
+
+
+def test_a_file_system_without_locks_is_said_and_used(tmp_path, monkeypatch, caplog):
+    def flock(*_):
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    append(tmp_path, 0)
+    assert "cannot be locked" in caplog.text
+    assert read_results(tmp_path).trials == (trial(0),)
 
 
 def test_a_folder_without_results_is_refused(tmp_path):

@@ -7,7 +7,7 @@ A trial gives the same whatever batch it is in, so a run can be stopped and gone
 
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 
 from keepaway_transfer.studies.results import ResultsFolder, Trial
 from keepaway_transfer.studies.study import Study
@@ -54,15 +54,23 @@ def run(
     Stopping the iteration gives up the batches that were not begun.
     """
     batches = plan(study, results.done, batch)
-    futures = [executor.submit(play, study, keys) for keys in batches]
+    pending = {executor.submit(play, study, keys) for keys in batches}
     try:
-        for future in as_completed(futures):
-            for trial in future.result():
-                results.append(trial)
-                yield trial
+        while pending:
+            done, pending = wait(pending, return_when=FIRST_COMPLETED)
+            whole = sorted(done, key=_failed, reverse=True)  # nothing played is lost by a failure
+            done.clear()  # a future keeps its trials as long as anything knows it
+            while whole:
+                for trial in whole.pop().result():
+                    results.append(trial)
+                    yield trial
     finally:
-        for future in futures:
+        for future in pending:
             future.cancel()
+
+
+def _failed(future: Future[list[Trial]]) -> bool:
+    return future.exception() is not None
 
 
 class Progress:

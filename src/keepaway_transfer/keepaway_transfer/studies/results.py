@@ -3,12 +3,14 @@
 `study.json` holds the settings, the code version and the command; `trials.jsonl` one JSON object a
 line and trial. A line is on the disk before the next trial is waited for, so that a run can be
 killed at any moment; half a line is cut off when the folder is opened to go on. A folder takes
-trials of one study only.
+trials of one study only, from one process at a time. Trials may be packed (gzip trials.jsonl);
+those that are added later lie beside them.
 """
 
 import fcntl
 import gzip
 import json
+import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,8 +18,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from keepaway_agent.files import write_whole
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.study import Study, study_from
+
+log = logging.getLogger(__name__)
 
 STUDY_FILE, TRIALS_FILE = "study.json", "trials.jsonl"
 
@@ -84,7 +89,7 @@ class ResultsFolder:
 
     def append(self, trial: Trial) -> None:
         """Add a trial and wait until it is on the disk."""
-        self._file.write(json.dumps(asdict(trial), separators=(",", ":")) + "\n")
+        self._file.write(json.dumps(asdict(trial), separators=(",", ":"), allow_nan=False) + "\n")
         self._file.flush()
         os.fsync(self._file.fileno())
 
@@ -114,17 +119,17 @@ def open_results(
             settings or code; another process is writing to them.
     """
     folder = Path(folder)
-    head = {"study": {**study.settings, "trials": study.trials}, "command": command}
-    head["code_version"] = code_version
-    if not (folder / STUDY_FILE).exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        _write_atomically(folder / STUDY_FILE, json.dumps(head, indent=1) + "\n")
-    elif not resume:
+    if (folder / STUDY_FILE).exists() and not resume:
         raise StudyError(f"{folder} has results: add --resume to go on, or name another folder")
-    else:
-        _check_same(folder, study, code_version, any_code)
+    folder.mkdir(parents=True, exist_ok=True)
     with open(folder / TRIALS_FILE, "a+", encoding="utf-8") as file:
-        _lock(file, folder)
+        _lock(file, folder)  # before anything is written that another process may have written too
+        if (folder / STUDY_FILE).exists():
+            _check_same(folder, study, code_version, any_code)
+        else:
+            settings = {**study.settings, "trials": study.trials}
+            head = {"study": settings, "command": command, "code_version": code_version}
+            write_whole(folder / STUDY_FILE, json.dumps(head, indent=1, allow_nan=False) + "\n")
         _cut_off_half_a_line(file)
         yield ResultsFolder(file, frozenset(trial.key for trial in _read_trials(folder)))
 
@@ -160,11 +165,20 @@ def _read_head(folder: Path) -> dict[str, Any]:
 
 
 def _read_trials(folder: Path) -> Iterator[Trial]:
-    plain, packed = folder / TRIALS_FILE, folder / f"{TRIALS_FILE}.gz"
-    with gzip.open(packed, "rt") if packed.exists() else plain.open() as lines:
-        for number, line in enumerate(lines, start=1):
-            if line.endswith("\n"):  # else it is still being written
-                yield _trial_from(line, f"{folder}, trial on line {number}")
+    """Every trial once: first the packed ones, then those that were added since."""
+    seen: set[tuple[str, int]] = set()
+    for name, opened in ((f"{TRIALS_FILE}.gz", gzip.open), (TRIALS_FILE, open)):
+        path = folder / name
+        if not path.exists():
+            continue
+        with opened(path, "rt", encoding="utf-8") as lines:
+            for number, line in enumerate(lines, start=1):
+                if not line.endswith("\n"):  # it is still being written
+                    continue
+                trial = _trial_from(line, f"{path}, trial on line {number}")
+                if trial.key not in seen:
+                    seen.add(trial.key)
+                    yield trial
 
 
 def _trial_from(line: str, where: str) -> Trial:
@@ -182,6 +196,10 @@ def _lock(file: IO[str], folder: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise StudyError(f"{folder}: another process is writing to these results") from None
+    except OSError as error:  # some network file systems know no locks
+        log.warning(
+            "%s cannot be locked (%s): see that one study alone writes there", folder, error
+        )
 
 
 def _cut_off_half_a_line(file: IO[str]) -> None:
@@ -190,9 +208,3 @@ def _cut_off_half_a_line(file: IO[str]) -> None:
     content = path.read_bytes()
     if not content.endswith(b"\n"):
         os.truncate(path, content.rfind(b"\n") + 1)
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    written = path.with_suffix(".partial")
-    written.write_text(text, encoding="utf-8")
-    written.replace(path)
