@@ -5,29 +5,31 @@
     .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2 --resume
     .venv/bin/python scripts/study.py mine.toml --scheduler tcp://cluster:8786 --out results/mine
 
-It can be stopped at any moment and gone on with (--resume). scripts/analyze.py makes the report.
+Ctrl-C, `kill` and a closed terminal stop it; it can be gone on with (--resume) whatever stopped it.
+scripts/analyze.py makes the report.
 """
 
 import argparse
 import dataclasses
 import logging
-import multiprocessing
 import os
 import shlex
 import sys
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
-from keepaway_agent.training.workers import end_with_parent
+from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
+from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.batch import play
 from keepaway_transfer.studies.experiment import Progress, run
+from keepaway_transfer.studies.processes import WorkerExecutor
 from keepaway_transfer.studies.results import open_results
 from keepaway_transfer.studies.study import Study, load_study
 
@@ -44,14 +46,17 @@ def main() -> int:
         study = load_study(arguments.study)
         if arguments.trials:
             study = dataclasses.replace(study, trials=arguments.trials)
-        _run(study, arguments)
+        with Interruption() as interruption:
+            return _run(study, arguments, interruption)
+    except Stopped as stopped:
+        print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
+        return stopped.code
     except (AgentError, KeepawayError, OSError) as error:
         print(f"study: {error}", file=sys.stderr)
         return 1
-    return 0
 
 
-def _run(study: Study, arguments: argparse.Namespace) -> None:
+def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption) -> int:
     with (
         open_results(
             arguments.out,
@@ -64,34 +69,34 @@ def _run(study: Study, arguments: argparse.Namespace) -> None:
         _executor(arguments) as executor,
     ):
         progress = Progress(study, results.done)
-        bar = tqdm(total=progress.trials, initial=progress.done, disable=None, bar_format=BAR)
-        try:
-            for trial in run(study, results, executor, play, arguments.batch):
+        with tqdm(
+            total=progress.trials, initial=progress.done, disable=None, bar_format=BAR
+        ) as bar:
+            for trial in run(study, results, executor, play, arguments.batch, interruption.shield):
                 progress.add(trial)
                 bar.set_description_str(str(progress), refresh=False)
                 bar.update()
                 if bar.disable:  # the output is no terminal
                     log.info("%s", progress)
-        except KeyboardInterrupt:
-            print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
-            os._exit(130)  # without waiting for batches: what is done is on the disk
-        bar.close()
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
+    return 0
 
 
 @contextmanager
 def _executor(arguments: argparse.Namespace) -> Iterator[Executor]:
     """Processes of this machine, or the workers of a Dask scheduler."""
     if arguments.scheduler:
-        from distributed import Client  # only a cluster needs it
+        from distributed import Client, KilledWorker  # only a cluster needs it
 
         with Client(arguments.scheduler) as client, client.get_executor() as executor:
-            yield executor
+            try:
+                yield executor
+            except KilledWorker as error:
+                raise StudyError(
+                    f"the cluster's workers were lost again and again: {error}"
+                ) from error
     else:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(
-            arguments.workers, mp_context=context, initializer=end_with_parent
-        ) as executor:
+        with WorkerExecutor(arguments.workers) as executor:
             yield executor
 
 

@@ -7,14 +7,16 @@
     .venv/bin/python scripts/train.py --taker-policy learn --policy hand --save-weights out/takers
     .venv/bin/python scripts/train.py --episodes 8000 --record out/bag --record-episodes 0-9,7999
 
-Ctrl-C stops it with all finished trials saved; the same command goes on from there. With --json the
-last line of the output is one JSON object. --record makes a bag, like a match's, of the first
-trial.
+Ctrl-C, `kill` and a closed terminal stop it with all finished trials saved; the same command goes
+on from there. With --json the last line of the output is one JSON object. --record makes a bag,
+like a match's, of the first trial.
 """
 
 import argparse
+import contextlib
 import dataclasses
 import json
+import logging
 import math
 import os
 import shlex
@@ -33,6 +35,7 @@ from keepaway_agent.training.training import RECORDED_TRIAL, Training
 from keepaway_agent.training.trial import Progress
 from keepaway_agent.training.trial_recorder import TrialRecorder
 from keepaway_agent.training.workers import NUM_FIELDS, play
+from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import add_options, numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.scores import Score, summary
@@ -48,6 +51,24 @@ Episodes = dict[int, tuple[np.ndarray, np.ndarray]]  # durations [cycles], outco
 def main() -> int:
     """Train, say how it went; a refusal is one line."""
     arguments = parse()
+    logging.basicConfig(format="train: %(message)s", handlers=[TqdmHandler()])
+    try:
+        with Interruption() as interruption:
+            return run(arguments, interruption)
+    except Stopped as stopped:  # in the beginning or in the end
+        return stopped.code
+
+
+class TqdmHandler(logging.Handler):
+    """Writes above the progress bar."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line."""
+        tqdm.write(self.format(record), file=sys.stderr)
+
+
+def run(arguments: argparse.Namespace, interruption: Interruption) -> int:
+    """Train what is missing; the exit code."""
     names = {entry.name for entry in dataclasses.fields(Training)}
     try:
         chosen = {name: value for name, value in vars(arguments).items() if name in names}
@@ -62,16 +83,19 @@ def main() -> int:
         episodes: Episodes = {k: folder.episodes(k) for k in folder.done} if folder else {}
         missing = [k for k in numbers if k not in episodes]
         recorder = recorder_of(training, missing, command, arguments)
-        rate = train(training, missing, arguments, folder, episodes, recorder)
+        with folder.lock() if folder else contextlib.nullcontext():
+            rate, code = train(
+                training, missing, arguments, folder, episodes, recorder, interruption
+            )
     except (AgentError, KeepawayError, OSError) as error:
         print(f"train: {error}", file=sys.stderr)
         return 1
     asked = {k: episodes[k] for k in range(arguments.trials) if k in episodes}
     report(training, asked, rate, folder, arguments)
-    if len(asked) < arguments.trials:
-        print("train: stopped; the same command goes on from here", file=sys.stderr)
-        return 130
-    return 0
+    if code:
+        ways_on = "the same command goes on from here" if folder else "nothing was to be saved"
+        print(f"train: stopped; {ways_on}", file=sys.stderr)
+    return code
 
 
 def recorder_of(
@@ -101,13 +125,14 @@ def train(
     folder: TrainingFolder | None,
     episodes: Episodes,
     recorder: TrialRecorder | None,
-) -> float | None:
-    """Play the trials that are missing; Ctrl-C ends it early.
+    interruption: Interruption,
+) -> tuple[float | None, int]:
+    """Play the trials that are missing; a signal ends it early.
 
     Returns:
-        Cycles a second once it runs, or None if nothing was played.
+        Cycles a second once it runs, or None if nothing was played, and the exit code.
     """
-    meter, played = Meter(len(numbers)), Progress()
+    meter, played, code = Meter(len(numbers)), Progress(), 0
     total = len(numbers) * training.episodes
     with tqdm(total=total, disable=None, unit=" episodes", smoothing=0.05) as bar:
 
@@ -120,13 +145,14 @@ def train(
             spread = arguments.processes, arguments.fields
             for result in play(training, numbers, *spread, watch, recorder):
                 if folder:
-                    folder.save(result)
+                    with interruption.shield():
+                        folder.save(result)
                 episodes[result.trial.label] = result.durations, result.outcomes
                 played.cycles += int(result.durations.sum())
             meter.read(played)
-        except KeyboardInterrupt:
-            pass
-    return meter.rate if numbers else None
+        except Stopped as stopped:
+            code = stopped.code
+    return meter.rate if numbers else None, code
 
 
 class Meter:

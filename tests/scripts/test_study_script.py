@@ -48,17 +48,38 @@ def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
     assert head["study"]["seed"] == TINY.seed
 
 
-@pytest.mark.parametrize(("how", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
-def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, how, code):
+def workers_of(process):
+    children = psutil.Process(process.pid).children()
+    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+
+
+@pytest.mark.parametrize(
+    ("signals", "code"),
+    [
+        ([signal.SIGKILL], -9),
+        ([signal.SIGINT, signal.SIGINT], 130),
+        ([signal.SIGTERM], 143),
+        ([signal.SIGHUP], 129),
+    ],
+)
+def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, code):
     log = tmp_path / "cut" / "trials.jsonl"
     arguments = ("--out", log.parent, "--batch", 1, "--trials", 20)
-    with subprocess.Popen(command(*arguments), stderr=subprocess.DEVNULL) as running:
+    with subprocess.Popen(command(*arguments), stderr=subprocess.PIPE, text=True) as running:
         while not log.exists() or log.read_bytes().count(b"\n") < 2:
             assert running.poll() is None
             time.sleep(0.01)
         workers = psutil.Process(running.pid).children()
-        running.send_signal(how)
+        for number in signals:
+            running.send_signal(number)
+            time.sleep(0.05)
+        _, said = running.communicate(timeout=60)
     assert running.returncode == code
+    assert "Traceback" not in said
+    assert "resource_tracker" not in said
+    if code > 0:
+        last = said.splitlines()[-1]
+        assert last == f"study: stopped; go on with --resume --out {log.parent}"
     assert psutil.wait_procs(workers, timeout=30)[1] == []  # none is left behind
     before = len(trials_in(log.parent))
     done = study(*arguments, "--resume")
@@ -66,6 +87,20 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, how, code)
     assert f"study: {before + 1}/60 trials" in done.stderr
     study("--out", tmp_path / "whole", "--trials", 20)
     assert trials_in(log.parent) == trials_in(tmp_path / "whole")
+
+
+def test_a_worker_that_is_killed_is_replaced_and_the_study_ends_with_the_same(whole, tmp_path):
+    arguments = ("--out", tmp_path / "out", "--workers", 2, "--batch", 1)
+    with subprocess.Popen(command(*arguments), stderr=subprocess.PIPE, text=True) as running:
+        while not (workers := workers_of(running)):
+            assert running.poll() is None
+            time.sleep(0.01)
+        workers[0].kill()
+        _, said = running.communicate(timeout=600)
+    assert running.returncode == 0, said
+    assert "was ended by SIGKILL (out of memory?); what it played is played again" in said
+    assert "Traceback" not in said
+    assert trials_in(tmp_path / "out") == trials_in(whole[0])
 
 
 def test_results_in_the_way_are_refused_in_one_line(whole):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import fcntl
 import hashlib
 import json
-import os
+import logging
 import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.errors import AgentError
+from keepaway_agent.errors import AgentError, WeightsError
+from keepaway_agent.files import check_writable, name_beside, write_whole
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.texts import one_line
 from keepaway_agent.training.training import Training
@@ -23,6 +26,8 @@ from keepaway_sim.version import code_version
 
 FORMAT: Final = "keepaway-training"
 FORMAT_VERSION: Final = 1
+
+log = logging.getLogger(__name__)
 
 
 class TrainingFolder:
@@ -62,34 +67,55 @@ class TrainingFolder:
                 _check_same(path, self._record, any_code)
             elif any(path.iterdir()):
                 raise AgentError(f"{path} holds something else: name another folder")
-            else:
-                _write_whole(path / "training.json", json.dumps(self._record, indent=1))
+            check_writable(path)
+            if not (path / "training.json").exists():
+                text = json.dumps(self._record, indent=1, allow_nan=False)
+                write_whole(path / "training.json", text)
         except OSError as error:
             raise AgentError(f"{path} cannot be used: {error}") from error
         self.done = sorted(int(trial.name[6:]) for trial in path.glob("trial_[0-9]*"))
+
+    @contextlib.contextmanager
+    def lock(self) -> Iterator[None]:
+        """Keep other processes from training into the folder, while the block lasts.
+
+        Raises:
+            AgentError: another one does.
+        """
+        with (self.path / "training.json").open("rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise AgentError(
+                    f"{self.path}: another process trains into it; name another folder"
+                ) from None
+            except OSError as error:  # some network file systems know no locks
+                log.warning("%s cannot be locked (%s): train there once at a time", file, error)
+            yield
 
     def save(self, result: TrialResult) -> None:
         """Put a finished trial into the folder, whole or not at all.
 
         Raises:
-            AgentError: it cannot be written.
+            AgentError: it cannot be written; the message says where what was written of it is.
         """
         number = int(result.trial.label)
-        beside = self.path / f".trial_{number:04}.{os.getpid()}.tmp"
+        beside = name_beside(self._folder(number))
         try:
-            shutil.rmtree(beside, ignore_errors=True)
             beside.mkdir()
-            _write_whole(beside / "episodes.csv", _episodes_text(result))
+            write_whole(beside / "episodes.csv", _episodes_text(result))
             for weights in self._learned(result):
                 save_weights(beside / f"{weights.player}.npz", weights)
                 if number == 0:
                     save_weights(self.path / f"{weights.player}.npz", weights, overwrite=True)
             beside.rename(self._folder(number))
-        except OSError as error:
-            raise AgentError(f"trial {number} cannot be written: {error}") from error
-        finally:
-            shutil.rmtree(beside, ignore_errors=True)
+        except (OSError, WeightsError) as error:
+            raise AgentError(
+                f"trial {number} cannot be written: {error}; what was written of it is in {beside}"
+            ) from error
         self.done = sorted([*self.done, number])
+        for cut in self.path.glob(f".{self._folder(number).name}.*.tmp"):
+            shutil.rmtree(cut, ignore_errors=True)  # of earlier attempts; the trial is whole now
 
     def episodes(self, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Durations [cycles] and outcomes of a trial's episodes, (num_episodes,) each."""
@@ -148,13 +174,6 @@ def _episodes_text(result: TrialResult) -> str:
     rows = zip(result.durations, names, strict=True)
     lines = [f"{number},{cycles},{name}" for number, (cycles, name) in enumerate(rows)]
     return "\n".join(["episode,cycles,outcome", *lines, ""])
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a text file that appears once it is whole."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(path)
 
 
 def _check_same(path: Path, record: dict[str, Any], any_code: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -11,7 +12,11 @@ from keepaway_sim.bags.writer import BagWriter
 
 
 class TrialRecorder:
-    """Writes one trial's bag: give it to the trial as its `watch`, and close it in the end."""
+    """Writes one trial's bag: give it to the trial as its `watch`, and close it in the end.
+
+    Attributes:
+        path: folder of the bag.
+    """
 
     def __init__(
         self,
@@ -30,7 +35,7 @@ class TrialRecorder:
             info: what else the bag says of how it was made.
             attachments: files by name, for example the weights that players begin with.
         """
-        self._path, self._seed, self._wanted = path, seed, wanted
+        self.path, self._seed, self._wanted = path, seed, wanted
         self._info, self._attachments = dict(info or {}), dict(attachments or {})
         self._bag: BagWriter | None = None
         self._recorder: FieldRecorder | None = None
@@ -45,6 +50,12 @@ class TrialRecorder:
         recorder.moment()
         recorder.requests(moment.action, moment.target, moment.values)
 
+    def anew(self) -> TrialRecorder:
+        """Another that records the same, beside what a process that was killed had begun."""
+        numbered = (self.path.with_name(f"{self.path.name}_{n}") for n in itertools.count(2))
+        free = next(path for path in numbered if not path.exists())
+        return TrialRecorder(free, self._seed, self._wanted, self._info, self._attachments)
+
     def close(self) -> None:
         """Finish the bag, if it was begun."""
         if self._bag:
@@ -53,7 +64,7 @@ class TrialRecorder:
     def _begin(self, moment: Moment) -> FieldRecorder:
         chosen = {} if self._wanted is None else {"episodes": "selected"}
         info = world_info(moment.world, self._seed, **chosen, **self._info)
-        self._bag = BagWriter(self._path, info)
+        self._bag = BagWriter(self.path, info)
         for name, data in self._attachments.items():
             self._bag.attach(name, data)
         wanted = self._wanted or _every_episode

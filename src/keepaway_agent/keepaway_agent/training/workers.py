@@ -1,21 +1,20 @@
-"""Trials spread over processes; results do not depend on how many."""
+"""Trials spread over processes; results do not depend on how many, nor on any that is killed."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
+import logging
 import math
-import multiprocessing
-import os
-import queue
-import signal
-import threading
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
+from multiprocessing.connection import Connection, wait
 from typing import Any, Final
 
 import numpy as np
 
 from keepaway_agent.errors import AgentError
+from keepaway_agent.training.processes import Worker, how_it_ended
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.training import RECORDED_TRIAL, Training
 from keepaway_agent.training.trial import Progress, TrialResult
@@ -23,6 +22,14 @@ from keepaway_agent.training.trial_recorder import TrialRecorder
 
 NUM_FIELDS: Final = 128
 """Fields played in lock-step by one process."""
+MAX_LOSSES: Final = 3
+"""Processes that may be killed, one after the other, without a trial being finished between."""
+
+Watch = Callable[[Progress], None]
+Assigned = tuple[int, TrialRecorder | None]
+"""A trial's number, and what records it."""
+
+log = logging.getLogger(__name__)
 
 
 def play(
@@ -30,135 +37,192 @@ def play(
     numbers: Sequence[int],
     processes: int = 1,
     num_fields: int = NUM_FIELDS,
-    watch: Callable[[Progress], None] | None = None,
+    watch: Watch | None = None,
     recorder: TrialRecorder | None = None,
 ) -> Generator[TrialResult, None, None]:
     """Play trials, and give each one's result as soon as it is over; `label` is its number.
+
+    A process that is killed is noticed at once and replaced, and what it played is played again; a
+    warning is logged that says so.
 
     Args:
         training: what is trained.
         numbers: of the trials.
         processes: over how many processes they are spread; results do not depend on it.
         num_fields: trials that a process plays side by side.
-        watch: is told of the progress several times a second.
+        watch: is called with the progress several times a second.
         recorder: records RECORDED_TRIAL, if that is among the numbers; see `Training.recorder`.
 
     Raises:
-        AgentError: a training that cannot be played, or a process that died.
+        AgentError: a training that cannot be played, or processes that are killed again and again.
         KeepawayError: something is in the place of the bag.
     """
     processes = max(1, min(processes, len(numbers)))
     num_fields = max(1, min(num_fields, math.ceil(len(numbers) / processes)))
     if processes == 1:
-        yield from _play_here(training, iter(numbers), num_fields, watch, recorder)
+        assigned = ((number, _recorder_of(number, recorder)) for number in numbers)
+        yield from _play_here(training, assigned, num_fields, watch)
         return
-    context = multiprocessing.get_context("spawn")
-    said: multiprocessing.Queue[Any] = context.Queue()
-    taken = context.Value("q", 0)
-    workers = [
-        context.Process(
-            target=_work,
-            args=(training, numbers, taken, num_fields, said, place, recorder),
-            daemon=True,
-        )
-        for place in range(processes)
-    ]
-    for worker in workers:
-        worker.start()
+    crew = _Crew(training, numbers, num_fields, recorder)
     try:
-        yield from _gather(workers, said, len(numbers), watch)
+        for _ in range(processes):
+            crew.hire()
+        yield from crew.results(watch)
     finally:
-        for worker in workers:
-            worker.terminate()
-        for worker in workers:
-            worker.join()
+        crew.dismiss()
+
+
+def _recorder_of(number: int, recorder: TrialRecorder | None) -> TrialRecorder | None:
+    return recorder if number == RECORDED_TRIAL else None
 
 
 def _play_here(
-    training: Training,
-    numbers: Iterator[int],
-    num_fields: int,
-    watch: Callable[[Progress], None] | None,
-    recorder: TrialRecorder | None,
+    training: Training, assigned: Iterator[Assigned], num_fields: int, watch: Watch | None
 ) -> Generator[TrialResult, None, None]:
     loaded = training.start()
     weights = np.stack([each.values for each in loaded]) if loaded else None
-    trials = (training.trial(number, weights, recorder) for number in numbers)
-    with contextlib.closing(recorder) if recorder else contextlib.nullcontext():
-        for result in Trainer(training.trainer, num_fields).run(trials, watch):
-            if recorder and result.trial.label == RECORDED_TRIAL:
-                recorder.close()
+    with contextlib.ExitStack() as recorders:
+
+        def trials() -> Iterator[Any]:
+            for number, recorder in assigned:
+                if recorder:
+                    recorders.enter_context(contextlib.closing(recorder))
+                yield training.trial(number, weights, recorder)
+
+        for result in Trainer(training.trainer, num_fields).run(trials(), watch):
+            if isinstance(result.trial.watch, TrialRecorder):
+                result.trial.watch.close()
             yield dataclasses.replace(result, trial=dataclasses.replace(result.trial, watch=None))
 
 
-def _work(
-    training: Training,
-    numbers: Sequence[int],
-    taken: Any,
-    num_fields: int,
-    said: Any,
-    place: int,
-    recorder: TrialRecorder | None,
-) -> None:
-    """A process: play one trial after the other of those that nobody has taken yet."""
-    end_with_parent()
+class _Ask:
+    """A worker asks for a trial."""
 
-    def next_numbers() -> Iterator[int]:
+
+def _work(pipe: Connection, training: Training, num_fields: int) -> None:
+    """A process: play one trial after the other, until there is none."""
+
+    def assigned() -> Iterator[Assigned]:
         while True:
-            with taken.get_lock():
-                position, taken.value = taken.value, taken.value + 1
-            if position >= len(numbers):
+            pipe.send(_Ask())
+            answer: Assigned | None = pipe.recv()
+            if answer is None:
                 return
-            yield numbers[position]
-
-    def tell(news: Any) -> None:
-        said.put((place, dataclasses.replace(news)))  # a copy: it is sent a little later
+            yield answer
 
     try:
-        for result in _play_here(training, next_numbers(), num_fields, tell, recorder):
-            tell(result)
+        for result in _play_here(training, assigned(), num_fields, pipe.send):
+            pipe.send(result)
     except ValueError as error:
-        said.put((place, error))
+        pipe.send(error)
 
 
-def end_with_parent() -> None:
-    """Let a worker process end when the process that started it does, however that ended.
+@dataclasses.dataclass
+class _Hired:
+    """What is known of one worker."""
 
-    For worker processes, which would otherwise wait for ever when a run was killed.
-    Ctrl-C in a terminal reaches workers too; it is left to the process that started them.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_wait_for_parent, daemon=True).start()
-
-
-def _wait_for_parent() -> None:
-    if (parent := multiprocessing.parent_process()) is not None:
-        parent.join()
-        os._exit(1)
+    worker: Worker
+    taken: list[int] = dataclasses.field(default_factory=list)  # trials that it plays
+    progress: Progress = dataclasses.field(default_factory=Progress)  # as it said last
+    finished: Progress = dataclasses.field(default_factory=Progress)  # of trials that came whole
 
 
-def _gather(
-    workers: Sequence[Any],
-    said: Any,
-    num_results: int,
-    watch: Callable[[Progress], None] | None,
-) -> Generator[TrialResult, None, None]:
-    """Results of all workers as they come; `watch` is told of the progress of all together."""
-    progress = [Progress() for _ in workers]
-    while num_results:
-        try:
-            place, news = said.get(timeout=0.5)
-        except queue.Empty:
-            dead = [worker for worker in workers if worker.exitcode not in (None, 0)]
-            if dead:
-                raise AgentError(f"a process died (exit code {dead[0].exitcode})") from None
-            continue
-        if isinstance(news, ValueError):
-            raise news
-        if isinstance(news, TrialResult):
-            num_results -= 1
-            yield news
-            continue
-        progress[place] = news
-        if watch:
-            watch(Progress(*map(sum, zip(*map(dataclasses.astuple, progress), strict=True))))
+class _Crew:
+    """The processes of a training, and who plays which trial."""
+
+    def __init__(
+        self,
+        training: Training,
+        numbers: Sequence[int],
+        num_fields: int,
+        recorder: TrialRecorder | None,
+    ) -> None:
+        self._training, self._num_fields, self._recorder = training, num_fields, recorder
+        self._waiting = deque(numbers)
+        self._left = len(numbers)
+        self._hired: dict[Connection, _Hired] = {}
+        self._before = Progress()  # what those finished that are gone
+        self._losses = 0  # since a trial was finished
+
+    def hire(self) -> None:
+        """Start one more process."""
+        worker = Worker(_work, self._training, self._num_fields)
+        self._hired[worker.pipe] = _Hired(worker)
+
+    def dismiss(self) -> None:
+        """End all processes."""
+        for hired in self._hired.values():
+            hired.worker.kill()
+        for hired in self._hired.values():
+            hired.worker.end()
+
+    def results(self, watch: Watch | None) -> Generator[TrialResult, None, None]:
+        """Results of all as they come; `watch` is called with the progress of all together."""
+        while self._left:
+            for ready in wait(list(self._hired)):
+                assert isinstance(ready, Connection)
+                try:
+                    news = ready.recv()
+                except (EOFError, OSError):
+                    self._replace(ready)
+                    continue
+                if isinstance(news, ValueError):
+                    raise news
+                if isinstance(news, TrialResult):
+                    self._note(self._hired[ready], news)
+                    yield news
+                elif isinstance(news, Progress):
+                    self._hired[ready].progress = news
+                    if watch:
+                        watch(self._progress())
+                else:
+                    self._assign(ready)
+
+    def _assign(self, pipe: Connection) -> None:
+        number = self._waiting.popleft() if self._waiting else None
+        if number is not None:
+            self._hired[pipe].taken.append(number)
+        answer = None if number is None else (number, _recorder_of(number, self._recorder))
+        with contextlib.suppress(OSError):  # it was killed, which is seen when it is read
+            pipe.send(answer)
+
+    def _note(self, hired: _Hired, result: TrialResult) -> None:
+        hired.taken.remove(int(result.trial.label))
+        one = Progress(1, len(result.durations), int(result.durations.sum()))
+        hired.finished = _sum(hired.finished, one)
+        self._left -= 1
+        self._losses = 0
+
+    def _replace(self, pipe: Connection) -> None:
+        """A process has ended: let another play what it had, if it was killed."""
+        gone = self._hired.pop(pipe)
+        how = how_it_ended(code := gone.worker.end())
+        self._before = _sum(self._before, gone.finished)
+        if not gone.taken and not code:
+            return
+        if code >= 0:
+            raise AgentError(f"a worker process {how}; what it wrote says why")
+        self._losses += 1
+        if self._losses >= MAX_LOSSES:
+            raise AgentError(
+                f"{self._losses} worker processes in a row were lost, the last {how}: what is"
+                " finished is kept; use fewer --processes or --fields"
+            )
+        log.warning("a worker process %s; %s", how, self._play_again(gone.taken))
+        self.hire()
+
+    def _play_again(self, numbers: Sequence[int]) -> str:
+        """Put trials in front of those that wait; what is done about it, in words."""
+        self._waiting.extendleft(reversed(numbers))
+        words = f"trials {', '.join(map(str, numbers))} are played again" if numbers else "goes on"
+        if RECORDED_TRIAL in numbers and self._recorder and self._recorder.path.exists():
+            self._recorder = self._recorder.anew()
+            words += f" and recorded to {self._recorder.path}"
+        return words
+
+    def _progress(self) -> Progress:
+        return _sum(self._before, *(hired.progress for hired in self._hired.values()))
+
+
+def _sum(*parts: Progress) -> Progress:
+    return Progress(*map(sum, zip(*map(dataclasses.astuple, parts), strict=True)))

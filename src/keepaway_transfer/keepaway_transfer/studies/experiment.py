@@ -8,6 +8,7 @@ A trial gives the same whatever batch it is in, so a run can be stopped and gone
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import AbstractContextManager, nullcontext
 
 from keepaway_transfer.studies.results import ResultsFolder, Trial
 from keepaway_transfer.studies.study import Study
@@ -47,11 +48,17 @@ def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...
 
 
 def run(
-    study: Study, results: ResultsFolder, executor: Executor, play: Play, batch: int
+    study: Study,
+    results: ResultsFolder,
+    executor: Executor,
+    play: Play,
+    batch: int,
+    shield: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Iterator[Trial]:
     """Play the trials that are left and yield each once it is on the disk.
 
-    Stopping the iteration gives up the batches that were not begun.
+    Stopping the iteration gives up the batches that were not begun. A batch that has been played is
+    written in a `shield`, that lets a signal wait.
     """
     batches = plan(study, results.done, batch)
     pending = {executor.submit(play, study, keys) for keys in batches}
@@ -61,9 +68,11 @@ def run(
             whole = sorted(done, key=_failed, reverse=True)  # nothing played is lost by a failure
             done.clear()  # a future keeps its trials as long as anything knows it
             while whole:
-                for trial in whole.pop().result():
-                    results.append(trial)
-                    yield trial
+                trials = whole.pop().result()
+                with shield():
+                    for trial in trials:
+                        results.append(trial)
+                yield from trials
     finally:
         for future in pending:
             future.cancel()
