@@ -32,8 +32,8 @@ def main() -> int:
         if arguments.results.suffix == ".kwy":
             print(_log_line(arguments.results, arguments.threshold or 9.0, arguments.window))
             return 0
-        if is_bag(arguments.results):
-            return _analyse_bag(arguments.results, arguments.out)
+        if is_bag(arguments.results) or arguments.results.is_file():
+            return _analyse_bag(arguments.results, arguments.out, arguments.match)
         results = read_results(arguments.results)
         out = arguments.out or arguments.results
         print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
@@ -44,9 +44,9 @@ def main() -> int:
     return 0
 
 
-def _analyse_bag(bag: Path, out: Path | None) -> int:
+def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
     out = out or (bag if bag.is_dir() else bag.parent) / "analysis"
-    print(analyse(bag, out))
+    print(analyse(bag, out, number))
     print(f"Written to {out}: episodes.csv and .parquet, summary.json and four figures.")
     return 0
 
@@ -74,6 +74,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument(
         "--curves", action="append", default=[], metavar="ROW", help="draw its learning curves"
     )
+    parser.add_argument("--match", type=int, help="number of the match, where a bag has several")
     parser.add_argument("--out", type=Path, help="another folder for the report")
     return parser.parse_args()
 

@@ -1,4 +1,4 @@
-"""Make a whole bag of one whose recorder was killed: everything up to its last whole chunk.
+"""Make a whole bag of one whose recorder was killed, or that is damaged: of all whole chunks.
 
     .venv/bin/python scripts/repair_bag.py out/bag                    # writes out/bag_repaired
     .venv/bin/python scripts/repair_bag.py out/bag out/whole
@@ -8,9 +8,12 @@ The unfinished bag is left as it is.
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from keepaway_sim.bags.gaps import count_gaps
+from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.bags.matches import find_matches
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
 from keepaway_sim.errors import KeepawayError
@@ -21,17 +24,47 @@ def main() -> int:
     args = parse()
     output = args.output or args.bag.with_name(f"{args.bag.stem}_repaired")
     try:
-        if BagReader(args.bag).complete and (args.bag / "metadata.yaml").is_file():
+        if is_whole(args.bag):
             print(f"{args.bag} is whole: nothing to repair")
             return 0
-        whole = repair(args.bag, output)
+        made = repair(args.bag, output)
+        print(f"{output}: {made.message_count} messages")
+        for problem in made.problems:
+            print(problem)
+        for line in matches_in(made):
+            print(line)
     except KeepawayError as error:
         print(f"repair_bag: {error}", file=sys.stderr)
         return 1
-    seconds = (whole.end_time - whole.start_time) / 1e9
-    print(f"{output}: {whole.message_count} messages of {seconds:.1f} simulated seconds")
-    print(count_gaps(whole).report())
     return 0
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a bag lacks nothing that a repair would make."""
+    try:
+        reader = BagReader(path)
+    except KeepawayError:
+        return False
+    return reader.complete and (path / "metadata.yaml").is_file() and not reader.problems
+
+
+def matches_in(reader: BagReader) -> Iterator[str]:
+    """What is missing of every match of a bag; a match that makes no sense is said to."""
+    try:
+        count = len(find_matches(reader))
+    except KeepawayError as error:
+        yield f"its match cannot be read: {error}"
+        return
+    for number in range(1, count + 1):
+        which = f"match {number}: " if count > 1 else ""
+        try:
+            bag = MatchBag(reader.path, number)
+            seconds = (bag.found.last[3] if bag.found.last else 0) / 1e9
+            yield f"{which}until {seconds:.1f} simulated seconds: {count_gaps(bag).report()}"
+        except KeepawayError as error:
+            yield f"{which}{error}"
+    if not count:
+        yield "no match is in it"
 
 
 def parse() -> argparse.Namespace:

@@ -25,6 +25,7 @@ import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.checks.decisions import check_decisions
 from keepaway_agent.errors import AgentError
@@ -33,27 +34,28 @@ from keepaway_sim.bags.playback import Playback
 from keepaway_sim.bags.verify import check_world
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.nodes.replayer import Replayer, Settings
+from keepaway_sim.nodes.replayer import Replayer, Settings, stoppable
 from keepaway_sim.wire.messages import SECOND
 
 
 def main() -> int:
     """Play it, or check it."""
     if "--check" in sys.argv:
-        return check(Path(parser().parse_args().path))
-    rclpy.init(args=parse_node_arguments(parser(), sys.argv[1:]))
-    executor = EventsExecutor()
+        options = parser().parse_args()
+        return check(Path(options.path), getattr(options, "match", 0))
+    arguments = parse_node_arguments(parser(), sys.argv[1:])
     try:
-        replayer = Replayer()
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        replayer, executor = Replayer(), EventsExecutor()
         executor.add_node(replayer)
-        with keys(replayer.playback) as obey:
+        with stoppable(executor) as spin, keys(replayer.playback) as obey:
 
-            def spin(seconds: float) -> None:
-                executor.spin_once(timeout_sec=seconds)
+            def spin_and_obey(seconds: float) -> None:
+                spin(seconds)
                 obey()
 
-            count = replayer.play(spin)
-        replayer.linger()
+            count = replayer.play(spin_and_obey)
+            replayer.linger()
         print(f"said {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
         print(f"replay: {error}", file=sys.stderr)
@@ -65,10 +67,10 @@ def main() -> int:
     return 0
 
 
-def check(path: Path) -> int:
+def check(path: Path, number: int) -> int:
     """Say whether the recorded match replays."""
     try:
-        bag = MatchBag(path)
+        bag = MatchBag(path, number)
         world, players = check_world(bag), check_decisions(bag)
     except (KeepawayError, AgentError) as error:
         print(f"replay: {error}", file=sys.stderr)

@@ -27,6 +27,7 @@ from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
 from keepaway_sim.view.page import replay_page
 from keepaway_sim.view.picture import picture
 from keepaway_sim.view.server import Server
+from keepaway_sim.world.config import CYCLE_TIME
 
 LAYOUT = Path(__file__).resolve().parents[1] / "src/keepaway_sim/foxglove/keepaway.json"
 
@@ -39,17 +40,18 @@ def main() -> int:
     try:
         numbers = numbers_in(args.episodes) if args.episodes else None
         if args.add_markers:
-            made = with_markers(args.bag, args.add_markers)
+            made = with_markers(args.bag, args.add_markers, args.match)
             print(f"{made.path}: {made.message_count} messages; open it in Foxglove with {LAYOUT}")
             return 0
         if args.picture:
             return take_picture(args, min(numbers) if numbers else 0)
-        text = replay_page(args.bag, numbers)
+        text, said = replay_page(args.bag, numbers, number=args.match)
     except KeepawayError as error:
         print(f"view: {error}", file=sys.stderr)
         return 1
     out = args.out or (args.bag if args.bag.is_dir() else args.bag.parent) / "replay.html"
     out.write_text(text, encoding="utf-8")
+    print(said)
     print(f"{out} ({len(text) / 1e6:.1f} MB): open it in a browser")
     return 0
 
@@ -78,12 +80,14 @@ def watch(host: str, port: int, ros: list[str]) -> int:
 
 def take_picture(args: argparse.Namespace, number: int) -> int:
     """Write a PNG of one moment."""
-    bag = MatchBag(args.bag)
+    bag = MatchBag(args.bag, args.match)
     episode = next((e for e in bag.episodes() if e.number == number), None)
     if episode is None:
         raise KeepawayError(f"episode {number} is not in {args.bag}")
     track = bag.track(episode)
-    row = min(round(args.time / bag.match["cycle_time"]), len(track.time) - 1)
+    if not 0 <= args.time < math.inf:
+        raise KeepawayError(f"--time {args.time}: give seconds since the episode's kick-off")
+    row = min(round(args.time / CYCLE_TIME), len(track.time) - 1)
     names = bag.task.player_names
     if args.player not in (None, *names):
         raise KeepawayError(f"player {args.player!r}: the match has {', '.join(names)}")
@@ -100,6 +104,7 @@ def parse() -> tuple[argparse.Namespace, list[str]]:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("bag", type=Path, metavar="BAG", nargs="?", help="folder of the bag")
+    parser.add_argument("--match", type=int, help="number of the match, where the bag has several")
     parser.add_argument("--episodes", help="that can be watched, like 7 or 0,90-99; default: some")
     parser.add_argument("--out", type=Path, help="page to write (default BAG/replay.html)")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="a picture instead of a page")

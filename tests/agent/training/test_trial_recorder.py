@@ -45,7 +45,7 @@ def test_a_bag_has_every_episode_of_the_trial(whole):
     bag, durations = whole
     assert [episode.cycles for episode in bag.episodes()] == durations.tolist()
     assert bag.reader.complete
-    assert count_gaps(bag.reader).report().startswith("nothing is missing")
+    assert count_gaps(bag).report().startswith("nothing is missing")
 
 
 def test_world_and_players_do_again_what_was_recorded(whole):
@@ -65,7 +65,7 @@ def test_chosen_episodes_are_those_of_the_whole_recording(whole, tmp_path):
     some = MatchBag(tmp_path / "bag")
     of_whole = {episode.number: episode for episode in whole[0].episodes()}
     assert [episode.number for episode in some.episodes()] == [2, 17]
-    assert not any(count_gaps(some.reader).missing().values())
+    assert not any(count_gaps(some).missing().values())
     for episode in some.episodes():
         assert episode == of_whole[episode.number]
         for ours, theirs in zip(some.track(episode), whole[0].track(episode), strict=True):

@@ -99,7 +99,7 @@ def test_a_match_that_was_on_is_counted_from_when_every_topic_was_heard(
 
 
 def test_hearing_nothing_is_not_called_complete() -> None:
-    assert GapCounter().report() == "no perception and no state was heard"
+    assert GapCounter().report() == "no perception and no state was recorded"
 
 
 def test_selected_episodes_are_no_gaps(recorded: list[Recorded]) -> None:

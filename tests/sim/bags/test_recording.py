@@ -21,7 +21,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
-from keepaway_sim.bags.topics import Qos, Recorded
+from keepaway_sim.bags.topics import Qos, Recorded, Topic
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.cdr import codec
@@ -103,7 +103,7 @@ def test_a_long_bag_goes_on_in_further_files(long_bag: tuple[Path, list[Recorded
 def test_a_long_bag_is_read_as_one(long_bag: tuple[Path, list[Recorded]]) -> None:
     path, written = long_bag
     reader = BagReader(path)
-    assert list(reader.messages()) == written
+    assert list(reader.messages()) == sorted(written, key=lambda message: message.log_time)
     assert reader.complete
     assert reader.info == {"gaps": "none"}
     assert reader.counts == {"/a": 1000, "/b": 1}
@@ -129,7 +129,7 @@ def test_a_file_that_was_only_just_begun_is_no_harm(long_bag: tuple[Path, list[R
     path, written = long_bag
     for begun in (b"", b"\x89MCAP"):
         (path / "long_99.mcap").write_bytes(begun)
-        assert list(BagReader(path).messages()) == written
+        assert sorted(BagReader(path).messages()) == sorted(written)
 
 
 def test_a_bag_is_whole_after_an_error(tmp_path: Path) -> None:
@@ -346,7 +346,7 @@ def test_older_definitions_are_kept_by_repair(tmp_path: Path) -> None:
         bag.add_topic("/episode", EPISODE, Qos(3, reliable=False), old, "RIHS01_old")
         bag.write("/episode", EPISODE, b"\x00\x01\x00\x00\x05\x00\x00\x00", 0)
     topic = repair(tmp_path / "old", tmp_path / "new").topics["/episode"]
-    assert topic == ("/episode", EPISODE, old, "RIHS01_old", Qos(3, reliable=False))
+    assert topic == Topic("/episode", EPISODE, old, "RIHS01_old", Qos(3, reliable=False))
 
 
 def test_the_match_comes_first(bag_3v2: Path) -> None:

@@ -41,7 +41,7 @@ def episodes(bag: MatchBag) -> list[EpisodeSummary]:
 @pytest.fixture(scope="module")
 def file(bag_3v2: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("page") / "replay.html"
-    made.write_text(replay_page(bag_3v2), encoding="utf-8")
+    made.write_text(replay_page(bag_3v2)[0], encoding="utf-8")
     return made
 
 

@@ -82,7 +82,7 @@ def test_frames_are_the_track_to_a_centimetre(track: Track, bag: MatchBag) -> No
 def test_the_page_lists_all_episodes_and_holds_the_chosen_ones(
     bag_3v2: Path, bag: MatchBag
 ) -> None:
-    data = data_of(replay_page(bag_3v2, {1, 3}))
+    data = data_of(replay_page(bag_3v2, {1, 3})[0])
     entries = data["episodes"]
     assert isinstance(entries, list)
     assert [entry["number"] for entry in entries] == [0, 1, 2, 3]
@@ -96,7 +96,7 @@ def test_the_page_lists_all_episodes_and_holds_the_chosen_ones(
 
 
 def test_the_page_needs_no_network(bag_3v2: Path) -> None:
-    text = replay_page(bag_3v2)
+    text, _ = replay_page(bag_3v2)
     assert not re.search(
         r"https?://|url\(|@import|<link[^>]+href=\"(?!data:)|<script[^>]+src", text
     )
@@ -105,7 +105,7 @@ def test_the_page_needs_no_network(bag_3v2: Path) -> None:
 
 def test_nothing_that_is_said_in_a_bag_becomes_part_of_the_page(bag: MatchBag) -> None:
     said = "</script><script>alert(1)</script>"
-    match = {**bag.match, "task": said, "player_names": [said] * 5}
+    match = {**bag.match, "task": said, "profile": said, "code_version": said}
     text = page({"live": False, "match": match_data(match), "episodes": []})
     assert text.count("<script") == 2
     assert said not in text
@@ -118,7 +118,7 @@ def test_an_episode_that_was_cut_off_is_shown_as_far_as_it_went(
     with BagWriter(tmp_path / "cut") as cut:
         for m in BagReader(bag_3v2).messages(end=third.start + 1_000_000_001):
             cut.write(m.topic, m.message_type, m.data, m.log_time)
-    data = data_of(replay_page(tmp_path / "cut"))
+    data = data_of(replay_page(tmp_path / "cut")[0])
     entries = data["episodes"]
     assert isinstance(entries, list)
     last = entries[-1]

@@ -6,10 +6,10 @@ player that learns is checked to have learned the same.
 """
 
 import io
-import json
 
 import numpy as np
 
+from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import read_weights
 from keepaway_agent.playing.agent import Agent, AgentConfig, Decision, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
@@ -50,7 +50,7 @@ def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
     """
     if "agents" not in bag.reader.info:
         raise KeepawayError(f"{bag.reader.path} does not say who played (no info 'agents')")
-    told = json.loads(bag.reader.info["agents"])
+    told = bag.agents
     match, files = bag.match, dict(bag.reader.attachments())
     facts = MatchFacts(
         num_keepers=match["num_keepers"],
@@ -65,7 +65,13 @@ def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
     for player, name in enumerate(match["player_names"]):
         if "command" in told.get(name, {}):
             continue
-        agents[player] = agent = Agent(facts, player, AgentConfig(**told.get(name, {})))
+        try:
+            config = AgentConfig(**told.get(name, {}))
+        except TypeError as error:
+            raise AgentError(
+                f"{bag.reader.path}: {name} has settings of no player: {error}"
+            ) from error
+        agents[player] = agent = Agent(facts, player, config)
         if f"{name}.npz" in files:
             agent.use(read_weights(io.BytesIO(files[f"{name}.npz"])))
     return agents

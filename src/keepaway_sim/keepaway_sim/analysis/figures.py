@@ -52,6 +52,14 @@ def passes_figure(passes: np.ndarray, task: Task) -> Figure:
     return figure
 
 
+def unknown_figure(title: str) -> Figure:
+    """No figure: the bag lacks what it would show."""
+    figure, axes = _figure(title, "", "")
+    axes.text(0.5, 0.5, "not known: field states are missing", ha="center", va="center")
+    axes.set_axis_off()
+    return figure
+
+
 def losses_figure(losses: np.ndarray, task: Task) -> Figure:
     """Where the ball was when episodes ended; (n, 3) x, y [m], outcome."""
     figure, axes = _figure("Where the ball was lost", "x (m)", "y (m)")

@@ -19,6 +19,7 @@ from keepaway_sim.analysis.figures import (
     hold_time_figure,
     losses_figure,
     passes_figure,
+    unknown_figure,
 )
 from keepaway_sim.analysis.tally import Analyst, EpisodeRow, Tally
 from keepaway_sim.bags.match_bag import MatchBag
@@ -37,7 +38,7 @@ SCHEMA = pa.schema(
 )  # fmt: skip
 
 
-def analyse(path: Path | str, output: Path) -> str:
+def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
     """Write table and figures of a bag, and give a summary in words.
 
     Writes `episodes.csv`, `episodes.parquet`, `summary.json`, and four figures.
@@ -45,21 +46,22 @@ def analyse(path: Path | str, output: Path) -> str:
     Args:
         path: the bag.
         output: folder to write to.
+        number: of the match, from 1 on, where the bag has several.
 
     Raises:
-        KeepawayError: no such bag.
+        KeepawayError: no such bag, or one that does not fit its match.
     """
-    bag = MatchBag(path)
-    output.mkdir(parents=True, exist_ok=True)
+    bag = MatchBag(path, number)
     analyst = Analyst(bag)
+    output.mkdir(parents=True, exist_ok=True)
     _write_table(analyst.rows(), output)
     tally, task = analyst.tally, bag.task
-    summary = summarise(bag, tally)
+    summary = summarise(bag, tally) | {"missing": analyst.gaps.report()}
     (output / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     made_by = f"{bag.match['task']}, seed {bag.match['seed']}, {bag.match['code_version']}"
     for name, figure in (
         ("hold_time", hold_time_figure(np.array(tally.durations))),
-        ("passes", passes_figure(tally.passes, task)),
+        ("passes", passes_figure(tally.passes, task) if tally.whole else unknown_figure("Passes")),
         ("losses", losses_figure(np.array(tally.losses).reshape(-1, 3), task)),
         ("actions", actions_figure(tally.actions, task)),
     ):
@@ -92,8 +94,8 @@ def _arrow(rows: list[EpisodeRow]) -> pa.Table:
 def summarise(bag: MatchBag, tally: Tally) -> dict[str, Any]:
     """A match in a few numbers."""
     durations = np.array(tally.durations)
-    outcomes = np.array([outcome for *_, outcome in tally.losses], dtype=np.int64)
-    count = len(durations)
+    outcomes = np.array(tally.outcomes, dtype=np.int64)
+    count, whole = len(durations), tally.whole
     actions = {
         name: {
             action.name.lower(): int(number)
@@ -111,8 +113,9 @@ def summarise(bag: MatchBag, tally: Tally) -> dict[str, Any]:
         "mean_duration_s": float(durations.mean()) if count else None,
         "sem_duration_s": float(durations.std(ddof=1) / np.sqrt(count)) if count > 1 else None,
         "out_of_bounds_share": float((outcomes == Outcome.OUT_OF_BOUNDS).mean()) if count else None,
-        "passes": tally.passes.tolist(),
-        "passes_per_episode": float(tally.passes.sum() / count) if count else None,
+        "whole_episodes": whole,
+        "passes": tally.passes.tolist() if whole else None,
+        "passes_per_episode": float(tally.passes.sum() / whole) if whole else None,
         "actions": actions,
     }
 
@@ -120,22 +123,34 @@ def summarise(bag: MatchBag, tally: Tally) -> dict[str, Any]:
 def in_words(summary: Mapping[str, Any]) -> str:
     """A summary as lines for a person."""
     if not summary["episodes"]:
-        return f"{summary['task']}: no finished episode in {summary['messages']:,} messages"
+        return (
+            f"{summary['task']}: no finished episode in {summary['messages']:,} messages\n"
+            f"{summary['missing']}"
+        )
     sem = summary["sem_duration_s"]
     spread = f" +- {sem:.2f}" if sem is not None else ""
     lines = [
         f"{summary['task']}: {summary['episodes']:,} episodes in {summary['messages']:,} messages",
         f"held {summary['mean_duration_s']:.2f}{spread} s on average,"
         f" {summary['out_of_bounds_share']:.0%} ended out of bounds,"
-        f" {summary['passes_per_episode']:.1f} passes arrived an episode",
+        f" {_passes(summary)}",
+        summary["missing"],
     ]
     with_ball = {action.name.lower() for action in WITH_BALL}
     for name, actions in summary["actions"].items():
         choices = {action: n for action, n in actions.items() if action in with_ball}
         others = {action: n for action, n in actions.items() if action not in with_ball}
         said = [_shares(choices, " with the ball"), _shares(others, "")]
-        lines.append(f"{name}: {'; '.join(filter(None, said)) or 'asked for nothing'}")
+        lines.append(f"{name}: {'; '.join(filter(None, said)) or 'no request was recorded'}")
     return "\n".join(lines)
+
+
+def _passes(summary: Mapping[str, Any]) -> str:
+    whole, count = summary["whole_episodes"], summary["episodes"]
+    if not whole:
+        return "passes are not known: field states are missing of every episode"
+    of_them = "" if whole == count else f" (in the {whole:,} that have all their field states)"
+    return f"{summary['passes_per_episode']:.1f} passes arrived an episode{of_them}"
 
 
 def _shares(actions: Mapping[str, int], when: str) -> str:

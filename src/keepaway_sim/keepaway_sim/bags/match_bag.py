@@ -5,22 +5,22 @@ Topics are found by their types, so a match may have been recorded in any namesp
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
+import functools
+from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from keepaway_sim.bags import checked
+from keepaway_sim.bags.matches import find_matches
+from keepaway_sim.bags.merging import Block, merged
+from keepaway_sim.bags.moments import Moments, Sorter
 from keepaway_sim.bags.reader import BagReader
-from keepaway_sim.bags.topics import Batch
+from keepaway_sim.bags.timeline import Timeline, chosen_match
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
-from keepaway_sim.wire.messages import (
-    CYCLE_NS,
-    MATCH,
-    SECOND,
-)
+from keepaway_sim.wire.messages import CYCLE_NS, MATCH
 from keepaway_sim.world.config import CYCLE_TIME, NEVER, Config
 
 
@@ -36,20 +36,19 @@ class EpisodeSummary(NamedTuple):
     lost_by: int  # player index; -1 nobody
 
 
-def episode_summaries(batch: Batch) -> Iterator[EpisodeSummary]:
-    """The episodes that a batch of Episode messages tells of."""
-    for entry in batch.data:
-        end = int(entry["stamp.sec"]) * SECOND + int(entry["stamp.nanosec"])
-        cycles = int(entry["cycles"])
-        yield EpisodeSummary(
-            number=int(entry["number"]),
-            start=end - cycles * CYCLE_NS,
-            end=end,
-            cycles=cycles,
-            duration=float(entry["duration"]),
-            outcome=Outcome(int(entry["outcome"])),
-            lost_by=int(entry["lost_by"]),
-        )
+def episode_summary(entry: np.void) -> EpisodeSummary:
+    """What an Episode message tells."""
+    end = int(checked.stamps_of(np.array([entry]))[0])
+    cycles = int(entry["cycles"])
+    return EpisodeSummary(
+        number=int(entry["number"]),
+        start=end - cycles * CYCLE_NS,
+        end=end,
+        cycles=cycles,
+        duration=float(entry["duration"]),
+        outcome=Outcome(int(entry["outcome"])),
+        lost_by=int(entry["lost_by"]),
+    )
 
 
 class Track(NamedTuple):
@@ -78,46 +77,63 @@ class Track(NamedTuple):
 
 
 class MatchBag:
-    """A bag of a match, understood.
+    """One match of a bag, understood.
+
+    Its messages are ordered by episode, cycle and player, whatever their log times; what came
+    more than once counts once.
 
     Attributes:
         reader: the bag.
+        found: where the match is in it.
         match: the Match message's fields.
         task: who plays, on what field.
-        names: topics of the match without their namespace -> as recorded.
+        timeline: its messages, and what was recorded with them, as they came.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, number: int | None = None) -> None:
         """Open a bag.
 
+        Args:
+            path: of the bag.
+            number: of the match, from 1 on, where the bag has several.
+
         Raises:
-            KeepawayError: no bag, or not of one match.
+            KeepawayError: no bag, none of a match, or of several and none is chosen.
         """
         self.reader = BagReader(path)
-        topics = self.reader.of_type(MATCH)
-        if len(topics) != 1:
-            found = ", ".join(topics) or "none"
-            raise KeepawayError(f"{path}: one topic of {MATCH} was expected, found {found}")
-        first = next(self.reader.messages(topics), None)
-        if first is None:
-            raise KeepawayError(f"{path}: the match was never described")
-        self.match = self.reader.codec(first.topic).decode(first.data)
-        self.namespace = first.topic.rpartition("/")[0]
-        self.task = Task(
-            self.match["num_keepers"],
-            self.match["num_takers"],
-            self.match["field_length"],
-            self.match["field_width"],
-        )
+        matches = find_matches(self.reader)
+        if not matches:
+            raise KeepawayError(f"{path}: {self._why_none()}")
+        self.found = chosen_match(matches, number, self.reader)
+        self.match, self.task = self.found.values, self.found.task
+        self.namespace = self.found.namespace
+        others = [match for match in matches if match is not self.found]
+        self.timeline = Timeline(self.reader, self.found, others)
 
-    @property
+    @functools.cached_property
     def config(self) -> Config:
         """The world's configuration.
 
         Raises:
             KeepawayError: the bag's is not one that this version knows.
         """
-        return Config.from_dict(json.loads(self.match["config_json"]))
+        try:
+            data = checked.read_json(self.match["config_json"], "config_json")
+            return Config.from_dict(data)
+        except (KeepawayError, OverflowError, AttributeError) as error:
+            raise KeepawayError(f"{self.reader.path}: {error}") from error
+
+    @functools.cached_property
+    def agents(self) -> dict[str, dict[str, Any]]:
+        """The settings of every player, by name, where the bag says who played; else empty.
+
+        Raises:
+            KeepawayError: it says it in another way than this version does.
+        """
+        try:
+            return checked.read_agents(self.reader.info.get("agents", "{}"))
+        except KeepawayError as error:
+            raise KeepawayError(f"{self.reader.path}: {error}") from error
 
     def topic(self, name: str) -> str:
         """The full name of one of the match's topics, "keeper_1/perception"."""
@@ -129,66 +145,106 @@ class MatchBag:
 
     def episodes(self) -> Iterator[EpisodeSummary]:
         """Every finished episode, in order."""
-        for batch in self.reader.batches([self.topic("episode")]):
-            yield from episode_summaries(batch)
+        return map(episode_summary, self.found.episodes)
 
     def unfinished(self) -> EpisodeSummary | None:
         """The episode that was being played when the recording ended, if there was one."""
-        since = self.reader.end_time - SECOND
-        last = None
-        for batch in self.reader.batches([self.topic("field_state")], since):
-            last = batch.data[-1]
-        if last is None or last["outcome"] != Outcome.IN_PLAY:
+        if self.found.last is None or self.found.last[2] != Outcome.IN_PLAY:
             return None
-        end = int(last["stamp.sec"]) * SECOND + int(last["stamp.nanosec"])
-        cycles = int(last["cycle"])
-        return EpisodeSummary(
-            int(last["episode"]), end - cycles * CYCLE_NS, end, cycles,
-            cycles * CYCLE_TIME, Outcome.IN_PLAY, -1,
-        )  # fmt: skip
+        episode, cycles, _, end = self.found.last
+        if self.found.episodes and int(self.found.episodes[-1]["number"]) >= episode:
+            return None
+        start = end - cycles * CYCLE_NS
+        duration = cycles * CYCLE_TIME
+        return EpisodeSummary(episode, start, end, cycles, duration, Outcome.IN_PLAY, -1)
+
+    def moments(self, episodes: Collection[int] | None = None) -> Iterator[Moments]:
+        """All that was said in some episodes, or in all: in order, each thing once, and checked.
+
+        Raises:
+            KeepawayError: messages that do not fit the match.
+        """
+        sorter = Sorter(self.reader, self.found)
+        wanted = None if episodes is None else np.array(sorted(episodes), dtype=np.int64)
+
+        def load(number: int) -> Block:
+            block = sorter.load(number)
+            if wanted is None:
+                return block
+            chosen = np.isin(block.keys >> 32, wanted)
+            return Block(block.data, block.rows[chosen], block.keys[chosen])
+
+        pieces = self.found.pieces
+        if wanted is not None:
+            pieces = [piece for piece in pieces if _reaches(piece.low, piece.high, wanted)]
+        for block in merged(pieces, load):
+            if len(block.rows):
+                yield sorter.moments(block)
 
     def track(self, episode: EpisodeSummary) -> Track:
-        """One episode's whole course."""
-        return self.tracks(episode.start, episode.end)
+        """One episode's whole course.
 
-    def tracks(self, start: int, end: int) -> Track:
-        """What was recorded of start <= simulated time <= end [ns]."""
-        said: dict[str, list[np.ndarray]] = {self.topic("field_state"): []}
-        for name in ("perception", "action_request"):
-            said |= {topic: [] for topic in self.player_topics(name)}
-        for batch in self.reader.batches(said, start, end + 1):
-            said[batch.topic].append(batch.data)
-        states = said[self.topic("field_state")]
-        if not states:
-            raise KeepawayError(f"{self.reader.path}: no field states from {start} to {end} ns")
-        state = np.concatenate(states)
-        track = _empty_track(state, self.task)
-        moments = {key: row for row, key in enumerate(_moments(state))}
-        cycles = {key[1:]: row for key, row in moments.items()}
-        for player, topic in enumerate(self.player_topics("perception")):
-            for data in said[topic]:
-                _add_perceptions(track, moments, player, data)
-        for player, topic in enumerate(self.player_topics("action_request")):
-            for data in said[topic]:
-                _add_requests(track, cycles, player, data)
-        return track
+        Raises:
+            KeepawayError: none of its field states was recorded.
+        """
+        for _, track in self.tracks([episode]):
+            return track
+        raise KeepawayError(f"{self.reader.path}: no field states of episode {episode.number}")
+
+    def tracks(
+        self, episodes: Collection[EpisodeSummary]
+    ) -> Iterator[tuple[EpisodeSummary, Track]]:
+        """The courses of some episodes in order, from one reading of the bag.
+
+        Those of which no field state was recorded are left out.
+        """
+        by_number = {episode.number: episode for episode in episodes}
+        pending: dict[int, list[Moments]] = {}
+        for moments in self.moments(by_number):
+            newest = moments.last_episode
+            for number, part in moments.by_episode():
+                pending.setdefault(number, []).append(part)
+            for number in sorted(n for n in pending if n < newest):
+                yield from _tracked(by_number[number], pending.pop(number), self)
+        for number in sorted(pending):
+            yield from _tracked(by_number[number], pending[number], self)
+
+    def _why_none(self) -> str:
+        topics = self.reader.of_type(MATCH)
+        if topics:
+            return "the match was never described"
+        untyped = [t.name for t in self.reader.topics.values() if not t.message_type]
+        hint = f"; {', '.join(untyped)[:100]}: without a type" if untyped else ""
+        return f"one topic of {MATCH} was expected, found none{hint}"
 
 
-def _stamps(data: np.ndarray) -> np.ndarray:
-    time: np.ndarray = data["stamp.sec"].astype(np.int64) * SECOND + data["stamp.nanosec"]
-    return time
+def _reaches(low: int, high: int, episodes: np.ndarray) -> bool:
+    first, last = np.searchsorted(episodes, [low >> 32, (high >> 32) + 1])
+    return bool(last > first)
 
 
-def _moments(data: np.ndarray) -> list[tuple[bool, int, int]]:
-    """What tells two cycles apart: an episode that was aborted shows its last cycle twice."""
-    ended = (data["outcome"] != Outcome.IN_PLAY).tolist()
-    return list(zip(ended, data["episode"].tolist(), data["cycle"].tolist(), strict=True))
+def _tracked(
+    episode: EpisodeSummary, parts: list[Moments], bag: MatchBag
+) -> Iterator[tuple[EpisodeSummary, Track]]:
+    """An episode's track, if a field state of it was recorded."""
+    states = [part.states for part in parts if len(part.states)]
+    if not states:
+        return
+    keys = np.concatenate([checked.moment_keys(state) for state in states])
+    track = _empty_track(np.concatenate(states), bag.task)
+    for part in parts:
+        for player, data in part.perceptions.items():
+            _add_perceptions(track, keys, player, data)
+        for player, pieces in part.requests.items():
+            for data in pieces:
+                _add_requests(track, keys, player, data)
+    yield episode, track
 
 
 def _empty_track(state: np.ndarray, task: Task) -> Track:
     count, num = len(state), task.num_players
     return Track(
-        time=_stamps(state),
+        time=checked.stamps_of(state),
         outcome=state["outcome"].astype(np.int64),
         cycle=state["cycle"].astype(np.int64),
         position=state["positions"].reshape(count, num + 1, 2).copy(),
@@ -208,10 +264,15 @@ def _empty_track(state: np.ndarray, task: Task) -> Track:
     )
 
 
-def _add_perceptions(
-    track: Track, moments: dict[tuple[bool, int, int], int], player: int, data: np.ndarray
-) -> None:
-    at = np.array([moments.get(moment, -1) for moment in _moments(data)])
+def _rows_of(keys: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Where keys are among others that are sorted; -1: they are not."""
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    found: np.ndarray = np.where(keys[at] == wanted, at, -1)
+    return found
+
+
+def _add_perceptions(track: Track, keys: np.ndarray, player: int, data: np.ndarray) -> None:
+    at = _rows_of(keys, checked.moment_keys(data))
     data, at = data[at >= 0], at[at >= 0]
     track.believed[at, player] = data["positions"].reshape(len(at), -1, 2)
     track.age[at, player] = data["ages"]
@@ -220,11 +281,8 @@ def _add_perceptions(
     track.cycles_to_ball[at, player] = data["cycles_to_ball"]
 
 
-def _add_requests(
-    track: Track, cycles: dict[tuple[int, int], int], player: int, data: np.ndarray
-) -> None:
-    answered = zip(data["episode"].tolist(), data["cycle"].tolist(), strict=True)
-    at = np.array([cycles.get(cycle, -1) for cycle in answered])
+def _add_requests(track: Track, keys: np.ndarray, player: int, data: np.ndarray) -> None:
+    at = _rows_of(keys, checked.moment_keys(data))
     data, at = data[at >= 0], at[at >= 0]
     track.requested[at, player] = data["action"]
     track.requested_target[at, player] = data["target"]

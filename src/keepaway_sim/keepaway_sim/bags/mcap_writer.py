@@ -51,7 +51,7 @@ class McapFileWriter:
         self._chunk_size = chunk_size
         self._name = path.name
         self._start = self._end = self._message_count = self._flushed_messages = 0
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[tuple[str, str, str], int] = {}
         self._channels: dict[str, int] = {}
         self._stream = path.open("xb")
         self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=compression)
@@ -61,19 +61,26 @@ class McapFileWriter:
 
     def add_topic(self, topic: Topic) -> None:
         """Register a topic with its type."""
-        if topic.message_type not in self._schemas:
-            self._schemas[topic.message_type] = self._mcap.register_schema(
-                topic.message_type, "ros2msg", topic.definition.encode()
-            )
         self._channels[topic.name] = self._mcap.register_channel(
             topic.name,
-            "cdr",
-            self._schemas[topic.message_type],
+            topic.encoding,
+            self._schema(topic),
             {
                 "offered_qos_profiles": to_yaml([topic.qos.to_dict()]),
                 "topic_type_hash": topic.type_hash,
             },
         )
+
+    def _schema(self, topic: Topic) -> int:
+        """The number of a topic's schema; 0 where it has none."""
+        key = topic.message_type, topic.definition, topic.schema_encoding
+        if not topic.message_type:
+            return 0
+        if key not in self._schemas:
+            name, definition, encoding = key
+            data = definition.encode(errors="surrogateescape")
+            self._schemas[key] = self._mcap.register_schema(name, encoding, data)
+        return self._schemas[key]
 
     @property
     def part(self) -> Part:

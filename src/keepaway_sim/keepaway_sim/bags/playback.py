@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from pathlib import Path
 
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.messages import SECOND
@@ -28,7 +27,7 @@ class Playback:
 
     def __init__(
         self,
-        reader: BagReader,
+        timeline: Timeline,
         rate: float = 1.0,
         start: int | None = None,
         end: int | None = None,
@@ -40,15 +39,15 @@ class Playback:
         Raises:
             KeepawayError: a rate that is none, a topic that the bag has not, or nothing to play.
         """
-        unknown = set(topics or ()) - reader.topics.keys()
+        unknown = set(topics or ()) - timeline.topics.keys()
         if unknown:
             raise KeepawayError(
-                f"{', '.join(sorted(unknown))}: the bag has {', '.join(reader.topics)}"
+                f"{', '.join(sorted(unknown))}: the bag has {', '.join(timeline.topics)}"
             )
-        self._reader, self._topics = reader, topics
+        self._timeline, self._topics = timeline, topics
         self._latched = {
             topic.name
-            for topic in reader.topics.values()
+            for topic in timeline.topics.values()
             if topic.qos.transient_local and (topics is None or topic.name in topics)
         }
         self._start, self._end = start, end
@@ -58,7 +57,7 @@ class Playback:
         self._begin()
         self.time = self._pending[0].log_time if self._pending else 0
         if self.finished:
-            raise KeepawayError(f"{reader.path}: nothing was recorded in that time")
+            raise KeepawayError(f"{timeline.reader.path}: nothing was recorded in that time")
         self.rate = rate
 
     @property
@@ -81,7 +80,7 @@ class Playback:
         """
         said: dict[str, Recorded] = {}
         if self._start is not None:
-            for message in self._reader.messages(self._latched, end=self._start):
+            for message in self._timeline.messages(self._latched, end=self._start):
                 said[message.topic] = message
         return [*said.values(), *self._opening]
 
@@ -129,7 +128,7 @@ class Playback:
 
     def _begin(self) -> None:
         self.finished = False
-        self._messages: Iterator[Recorded] = self._reader.messages(
+        self._messages: Iterator[Recorded] = self._timeline.messages(
             self._topics, self._start, self._end
         )
         self._opening: list[Recorded] = []
@@ -150,15 +149,15 @@ class Playback:
             self._next = next(self._messages, None)
 
 
-def episode_times(path: Path | str, first: int, last: int) -> tuple[int, int]:
+def episode_times(bag: MatchBag, first: int, last: int) -> tuple[int, int]:
     """From when until when episodes first..last were played [ns], the end excluded.
 
     Raises:
         KeepawayError: the bag has not all of them.
     """
-    wanted = [e for e in MatchBag(path).episodes() if first <= e.number <= last]
+    episodes = list(bag.episodes())
+    wanted = [episode for episode in episodes if first <= episode.number <= last]
     if not wanted or wanted[0].number != first or wanted[-1].number != last:
-        have = [e.number for e in MatchBag(path).episodes()]
-        known = f"{have[0]}..{have[-1]}" if have else "none"
-        raise KeepawayError(f"episodes {first}..{last}: {path} has {known}")
+        known = f"{episodes[0].number}..{episodes[-1].number}" if episodes else "none"
+        raise KeepawayError(f"episodes {first}..{last}: {bag.reader.path} has {known}")
     return wanted[0].start, wanted[-1].end + 1

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from keepaway_sim.bags.mcap_reader import MAGIC, Chunk, McapFile
+from keepaway_sim.bags.files import bag_files
+from keepaway_sim.bags.mcap_reader import Chunk, McapFile
+from keepaway_sim.bags.merging import Block, Piece, merged
 from keepaway_sim.bags.topics import Batch, Recorded, Topic
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire import cdr
+
+_MOST_FILES = 10_000
+
+
+class Place(NamedTuple):
+    """A chunk of a file."""
+
+    file: McapFile
+    chunk: Chunk
+
+
+Choice = Callable[[int, np.ndarray], np.ndarray]
+"""Which of a place's rows are wanted: by the place's number and its (n, 4) rows, (n,) bool."""
 
 
 class BagReader:
     """Reads a bag, also one whose writer was killed: up to its last whole chunk.
 
-    Messages come in the order in which they were written. Memory does not grow with the bag: one
-    chunk is unpacked at a time.
+    Messages come in the order of their log times, wherever they stand in the files. Memory does
+    not grow with the bag (see `merging`).
 
     Attributes:
         path: what was opened.
@@ -26,60 +41,158 @@ class BagReader:
         topics: by name.
         counts: messages by topic name.
         complete: whether the writer finished it.
+        missing_files: names of files that metadata.yaml lists, and that are not there.
+        problems: what is wrong with its files, in words.
+        places: all its messages, in the order of the files.
         start_time, end_time: of its messages [ns]; both 0 without messages.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, tolerant: bool = False) -> None:
         """Open a bag's folder, or an MCAP file by itself.
+
+        Args:
+            path: of the bag.
+            tolerant: pass over damaged chunks; they are among the problems.
 
         Raises:
             KeepawayError: there is no bag.
         """
         self.path = Path(path)
+        found = bag_files(self.path)
+        if len(found.paths) > _MOST_FILES:
+            raise KeepawayError(f"{path}: {len(found.paths):,} files, more than {_MOST_FILES:,}")
         self.info: dict[str, str] = {}
         self.topics: dict[str, Topic] = {}
         self.counts: dict[str, int] = {}
-        self._layouts: dict[tuple[str, int], tuple[dict[str, int], np.dtype[np.void]]] = {}
-        self._files = [McapFile(file) for file in _mcap_files(self.path)]
+        self.missing_files, self.problems = found.missing, found.problems
+        self._layouts: dict[tuple[int, int], tuple[dict[str, int], np.dtype[np.void]]] = {}
+        self._kinds: list[Topic] = []
+        self._numbers: dict[tuple[str, ...], int] = {}
+        self._files = [McapFile(file, tolerant) for file in found.paths]
         for file in self._files:
-            self.info.update(file.info)
-            for topic, count in file.contents():
-                self.topics.setdefault(topic.name, topic)
-                self.counts[topic.name] = self.counts.get(topic.name, 0) + count
+            self._add(file)
+        if found.message_count not in (None, self.message_count) and not found.missing:
+            self.problems.append(
+                f"metadata.yaml counts {found.message_count:,} messages,"
+                f" the files have {self.message_count:,}"
+            )
         self.complete = all(file.complete for file in self._files)
-        chunks = [chunk for file in self._files for chunk in file.chunks]
-        self.start_time = min((chunk.start_time for chunk in chunks), default=0)
-        self.end_time = max((chunk.end_time for chunk in chunks), default=0)
+        self.places = [Place(file, chunk) for file in self._files for chunk in file.chunks]
+        self.start_time = min((place.chunk.start_time for place in self.places), default=0)
+        self.end_time = max((place.chunk.end_time for place in self.places), default=0)
 
     @property
     def message_count(self) -> int:
         """Messages in the bag."""
         return sum(self.counts.values())
 
+    @property
+    def kinds(self) -> list[Topic]:
+        """What a block's numbers of topics stand for; two of one name differ in their types."""
+        return self._kinds
+
     def of_type(self, message_type: str) -> list[str]:
         """The names of the topics that carry this type, in the order of their registration."""
         return [t.name for t in self.topics.values() if t.message_type == message_type]
 
     def codec(self, topic: str) -> cdr.Codec:
-        """How to read a topic's messages, by the definition that the bag itself carries."""
-        entry = self.topics[topic]
-        return cdr.codec(entry.message_type, entry.definition)
+        """How to read a topic's messages, by the definition that the bag itself carries.
+
+        Raises:
+            KeepawayError: it has none that can be read, or more than one.
+        """
+        return self.codec_of(self.number(topic))
+
+    def number(self, topic: str) -> int:
+        """A topic's number in blocks.
+
+        Raises:
+            KeepawayError: it has messages of two types.
+        """
+        numbers = [number for number, kind in enumerate(self._kinds) if kind.name == topic]
+        if len(numbers) > 1:
+            types = " and ".join(self._kinds[n].message_type or "no type" for n in numbers)
+            raise KeepawayError(f"{self.path}: {topic} carries {types}, or two versions of it")
+        return numbers[0]
+
+    def codec_of(self, number: int) -> cdr.Codec:
+        """How to read the messages of a topic, by its number in blocks.
+
+        Raises:
+            KeepawayError: it has no definition that can be read.
+        """
+        topic = self._kinds[number]
+        if not topic.is_ros:
+            how = f"{topic.schema_encoding or 'no schema'}, {topic.encoding}"
+            raise KeepawayError(f"{self.path}: {topic.name} is not ROS 2's ({how})")
+        try:
+            return cdr.codec(topic.message_type, topic.definition)
+        except (ValueError, RecursionError) as error:
+            raise KeepawayError(f"{self.path}: {topic.name}: {error}") from error
+
+    def load(self, place: Place) -> Block:
+        """The messages of one chunk, with their log times as keys.
+
+        Raises:
+            KeepawayError: it is damaged.
+        """
+        data, rows = place.file.unpack(place.chunk)
+        rows = rows.copy()
+        rows[:, 0] = self._renumbered(place.file, rows[:, 0])
+        return Block(data, rows, rows[:, 1])
+
+    def blocks(
+        self,
+        topics: Collection[str] | None = None,
+        start: int | None = None,
+        end: int | None = None,
+        chosen: Choice | None = None,
+    ) -> Iterator[Block]:
+        """The messages of these topics (or of all) with start <= log_time < end [ns], in order.
+
+        Args:
+            topics: their names.
+            start, end: of their log times [ns].
+            chosen: which of a place's rows are wanted at all.
+
+        Raises:
+            KeepawayError: a damaged chunk.
+        """
+        low = -(2**63) if start is None else start
+        high = 2**63 - 1 if end is None else end - 1
+        wanted = None if topics is None else self._numbers_of(topics)
+
+        def load(number: int) -> Block:
+            block = self.load(self.places[number])
+            own = (block.keys >= low) & (block.keys <= high)
+            if wanted is not None:
+                own &= np.isin(block.rows[:, 0], wanted)
+            if chosen is not None:
+                own &= chosen(number, block.rows)
+            return Block(block.data, block.rows[own], block.keys[own])
+
+        pieces = [
+            Piece(chunk.start_time, chunk.end_time, chunk.size, number)
+            for number, place in enumerate(self.places)
+            for chunk in [place.chunk]
+            if chunk.end_time >= low and chunk.start_time <= high
+            if topics is None or place.file.may_have(chunk, topics)
+        ]
+        return merged(pieces, load)
 
     def messages(
         self,
         topics: Collection[str] | None = None,
         start: int | None = None,
         end: int | None = None,
+        chosen: Choice | None = None,
     ) -> Iterator[Recorded]:
-        """The messages of these topics (or of all) with start <= log_time < end [ns]."""
-        for file, chunk in self._chunks(start, end):
-            data, index = file.unpack(chunk)
-            for channel, log_time, first, last in index.tolist():
-                topic = file.topic(channel)
-                if topics is not None and topic.name not in topics:
-                    continue
-                if (start is None or log_time >= start) and (end is None or log_time < end):
-                    yield Recorded(topic.name, topic.message_type, log_time, data[first:last])
+        """The same, message by message."""
+        names = [(topic.name, topic.message_type) for topic in self._kinds]
+        for data, rows, _ in self.blocks(topics, start, end, chosen):
+            for number, log_time, first, last in rows.tolist():
+                name, message_type = names[number]
+                yield Recorded(name, message_type, log_time, data[first:last])
 
     def batches(
         self,
@@ -92,39 +205,49 @@ class BagReader:
         Raises:
             KeepawayError: a message with strings or messages in sequences, which has no dtype.
         """
-        for file, chunk in self._chunks(start, end):
-            data, index = file.unpack(chunk)
-            low = chunk.start_time if start is None else start
-            high = chunk.end_time + 1 if end is None else end
-            index = index[(index[:, 1] >= low) & (index[:, 1] < high)]
+        for data, rows, _ in self.blocks(topics, start, end):
             raw = np.frombuffer(data, np.uint8)
-            for channel in np.unique(index[:, 0]):
-                topic = file.topic(int(channel))
-                if topic.name in topics:
-                    of_topic = index[index[:, 0] == channel]
-                    for same in _runs_of_equal_size(of_topic):
-                        yield from self._batches_of_run(topic.name, raw, same)
+            for number in np.unique(rows[:, 0]).tolist():
+                for same in _runs_of_equal_size(rows[rows[:, 0] == number]):
+                    yield from self._batches_of_run(number, raw, same)
 
     def attachments(self) -> Iterator[tuple[str, bytes]]:
         """Name and contents of every attached file."""
         for file in self._files:
             yield from file.attachments()
 
-    def _chunks(self, start: int | None, end: int | None) -> Iterator[tuple[McapFile, Chunk]]:
-        for file in self._files:
-            for chunk in file.chunks:
-                if start is not None and chunk.end_time < start:
-                    continue
-                if end is not None and chunk.start_time >= end:
-                    continue
-                yield file, chunk
+    def _add(self, file: McapFile) -> None:
+        self.info.update(file.info)
+        self.problems += file.damaged
+        for channel, topic in file.topics.items():
+            name, message_type, definition, _, _, *encodings = topic
+            key = (name, message_type, definition, *encodings)
+            if key not in self._numbers:
+                self._numbers[key] = len(self._kinds)
+                self._kinds.append(topic)
+            self.topics.setdefault(topic.name, topic)
+            count = file.counts.get(channel, 0)
+            self.counts[topic.name] = self.counts.get(topic.name, 0) + count
 
-    def _batches_of_run(self, topic: str, raw: np.ndarray, index: np.ndarray) -> Iterator[Batch]:
+    def _numbers_of(self, topics: Collection[str]) -> list[int]:
+        return [number for number, topic in enumerate(self._kinds) if topic.name in topics]
+
+    def _renumbered(self, file: McapFile, channels: np.ndarray) -> np.ndarray:
+        """The bag's numbers of topics for a file's channels."""
+        table = np.full(2**16, -1)
+        for channel in np.unique(channels).tolist():
+            name, message_type, definition, _, _, *encodings = file.topics[channel]
+            table[channel] = self._numbers[name, message_type, definition, *encodings]
+        numbers: np.ndarray = table[channels]
+        return numbers
+
+    def _batches_of_run(self, number: int, raw: np.ndarray, index: np.ndarray) -> Iterator[Batch]:
         """Messages of one size may still differ in where they have it: split until they do not."""
+        topic = self._kinds[number].name
         size = int(index[0, 3] - index[0, 2])
         rows = raw[index[:, 2, None] + np.arange(size)]
         while len(index):
-            lengths, dtype = self._layout(topic, rows[0])
+            lengths, dtype = self._layout(number, rows[0])
             data = rows.view(dtype)[:, 0]
             alike = np.ones(len(index), dtype=bool)
             for name, length in lengths.items():
@@ -133,15 +256,15 @@ class BagReader:
             yield Batch(topic, index[:count, 1], data[:count])
             index, rows = index[count:], rows[count:]
 
-    def _layout(self, topic: str, message: np.ndarray) -> tuple[dict[str, int], np.dtype[np.void]]:
+    def _layout(self, number: int, message: np.ndarray) -> tuple[dict[str, int], np.dtype[np.void]]:
         """The lengths of a message's sequences and so its type; mostly as the last of its size."""
-        key = self.topics[topic].message_type, len(message)
+        key = number, len(message)
         if key in self._layouts:
             lengths, dtype = self._layouts[key]
             first = message.view(dtype)[0]
             if all(first[f"{name}.length"] == length for name, length in lengths.items()):
                 return lengths, dtype
-        codec = self.codec(topic)
+        codec = self.codec_of(number)
         lengths = codec.lengths(codec.decode(message.tobytes()))
         self._layouts[key] = lengths, codec.dtype(lengths, len(message))
         return self._layouts[key]
@@ -150,22 +273,9 @@ class BagReader:
 def is_bag(path: Path | str) -> bool:
     """Is it a bag's folder, or an MCAP file by itself?"""
     path = Path(path)
-    return path.suffix == ".mcap" if path.is_file() else any(path.glob("*.mcap"))
-
-
-def _mcap_files(path: Path) -> list[Path]:
     if path.is_file():
-        return [path]
-    listed = sorted(path.glob("*.mcap"), key=_file_number)
-    if not listed:
-        raise KeepawayError(f"{path}: no bag there (a folder with an .mcap file, or such a file)")
-    # A writer that was killed, or found the disk full, may only just have begun its last file.
-    return [file for file in listed if file.stat().st_size >= len(MAGIC)] or listed[:1]
-
-
-def _file_number(path: Path) -> int:
-    number = re.search(r"_(\d+)$", path.stem)
-    return int(number[1]) if number else 0
+        return path.suffix in (".mcap", ".zstd")
+    return any(path.glob("*.mcap")) or any(path.glob("*.mcap.zstd"))
 
 
 def _runs_of_equal_size(index: np.ndarray) -> list[np.ndarray]:

@@ -68,15 +68,22 @@ def whole_episodes(bag: MatchBag) -> Iterator[tuple[EpisodeSummary, Track]]:
     Raises:
         KeepawayError: a cycle is missing.
     """
-    for episode in bag.episodes():
-        track = bag.track(episode)
-        expected = episode.cycles + 1 + (episode.outcome == Outcome.ABORTED)
-        if len(track.time) != expected:
-            raise KeepawayError(
-                f"{bag.reader.path}: episode {episode.number} has {len(track.time)} of its"
-                f" {expected} field states"
-            )
+    waiting = list(bag.episodes())
+    for episode, track in bag.tracks(waiting):
+        _check_whole(bag, waiting.pop(0), episode, len(track.time))
         yield episode, track
+    for episode in waiting:
+        _check_whole(bag, episode, episode, 0)
+
+
+def _check_whole(bag: MatchBag, due: EpisodeSummary, episode: EpisodeSummary, found: int) -> None:
+    """Whether the episode that is due came, with all its cycles."""
+    found = found if episode is due else 0
+    expected = due.cycles + 1 + (due.outcome == Outcome.ABORTED)
+    if found != expected:
+        raise KeepawayError(
+            f"{bag.reader.path}: episode {due.number} has {found} of its {expected} field states"
+        )
 
 
 def _compare(world: World, track: Track, row: int) -> Difference | None:

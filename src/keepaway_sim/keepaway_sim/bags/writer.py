@@ -132,9 +132,13 @@ class BagWriter:
         qos = qos or default_qos(message_type)
         if definition is None:
             definition, type_hash = cdr.definition(message_type), cdr.type_hash(message_type)
-        topic = Topic(name, message_type, definition, type_hash or "", qos)
-        self.topics[name], self._counts[name] = topic, 0
-        self._file.add_topic(topic)
+        self.copy_topic(Topic(name, message_type, definition, type_hash or "", qos))
+
+    def copy_topic(self, topic: Topic) -> None:
+        """Register a topic as another bag has it, of whatever type, unless one of its name is."""
+        if topic.name not in self.topics:
+            self.topics[topic.name], self._counts[topic.name] = topic, 0
+            self._file.add_topic(topic)
 
     def write(self, topic: str, message_type: str, data: bytes, log_time: int) -> None:
         """Write one message.
@@ -241,7 +245,7 @@ class BagWriter:
                     "topic_metadata": {
                         "name": topic.name,
                         "type": topic.message_type,
-                        "serialization_format": "cdr",
+                        "serialization_format": topic.encoding,
                         "offered_qos_profiles": [topic.qos.to_dict()],
                         "type_description_hash": topic.type_hash,
                     },

@@ -86,10 +86,13 @@ def numbers_in(text: str) -> set[int]:
     """
     numbers: set[int] = set()
     for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        found = re.fullmatch(r"\s*(\d{1,9})(?:-(\d{1,9}))?\s*", part)
         if not found:
             raise KeepawayError(f"{text!r}: write numbers like 7 or 3-9 or 0,5,10-12")
-        numbers |= set(range(int(found[1]), int(found[2] or found[1]) + 1))
+        first, last = int(found[1]), int(found[2] or found[1])
+        if last < first:
+            raise KeepawayError(f"{text!r}: {first}-{last} goes backwards; write {last}-{first}")
+        numbers |= set(range(first, last + 1))
     return numbers
 
 

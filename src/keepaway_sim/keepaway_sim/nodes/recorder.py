@@ -23,6 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from keepaway_sim.bags.gaps import GapCounter
+from keepaway_sim.bags.timeline import OwnTimes
 from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
@@ -39,9 +40,7 @@ from keepaway_sim.wire.messages import (
     MARKERS,
     MATCH,
     PERCEPTION,
-    read_saying,
     stamp,
-    stamp_of,
 )
 
 POLL_PERIOD = 0.005  # [s]
@@ -49,7 +48,6 @@ FLUSH_PERIOD = 1.0  # [s]
 QUIET = 0.3  # [s] nothing came for so long: all that was said has come
 LONGEST_FAREWELL = 5.0  # [s] a match that goes on is left after so long
 REPORT_STEP = 10 * CYCLE_NS  # whoever waits for it lets it be further behind than that
-REMEMBERED_CYCLES = 100  # whose time is known when a request answers them
 SAID_BY_THE_MATCH = {
     "/clock": CLOCK,
     "match": MATCH,
@@ -111,8 +109,7 @@ class Recorder(Node):
         self.settings = declared(self, Settings)
         self.gaps = GapCounter()
         self._subscriptions_by_topic: dict[str, tuple[str, Subscription]] = {}
-        self._last_time = 0  # [ns] simulated, of the last stamped message
-        self._times: dict[tuple[int, int], int] = {}  # [ns] of an episode's cycles
+        self._times = OwnTimes()
         self._reported = -1
         self._flushed = time.monotonic()
         for name, message_type in self.settings.topics().items():
@@ -172,7 +169,7 @@ class Recorder(Node):
             qos = offered_qos(self, topic, default_qos(message_type))
             self.bag.add_topic(topic, message_type, qos)
         self.gaps.feed(topic, message_type, data)
-        self.bag.write(topic, message_type, data, self._time(message_type, data))
+        self.bag.write(topic, message_type, data, self._times.of(message_type, data))
         if message_type == MATCH:
             self._listen_to_players(codec(MATCH).decode(data)["player_names"])
 
@@ -196,23 +193,6 @@ class Recorder(Node):
         if not 0 <= time_ns - self._reported < step:  # time may begin anew
             self._reported = time_ns
             self._recorded.publish(Time(**stamp(time_ns)))
-
-    def _time(self, message_type: str, data: bytes) -> int:
-        """When a message was said, simulated [ns]: by its stamp, or what it answers, or now."""
-        own = stamp_of(message_type, data)
-        if own is not None:
-            self._last_time = own
-            if message_type == PERCEPTION:
-                self._remember(read_saying(PERCEPTION, data)[:2], own)
-            return own
-        if message_type == ACTION_REQUEST:
-            return self._times.get(read_saying(ACTION_REQUEST, data)[:2], self._last_time)
-        return self._last_time
-
-    def _remember(self, moment: tuple[int, int], time_ns: int) -> None:
-        self._times[moment] = time_ns
-        if len(self._times) > REMEMBERED_CYCLES:
-            del self._times[next(iter(self._times))]
 
 
 def main(args: list[str] | None = None) -> int:
@@ -239,8 +219,8 @@ def main(args: list[str] | None = None) -> int:
     except KeepawayError as error:
         recorder.get_logger().error(str(error))
         return 2
-    missing = any(recorder.gaps.missing().values()) or not recorder.gaps.received
-    log = recorder.get_logger().warning if missing else recorder.get_logger().info
+    complete = recorder.gaps.is_complete()
+    log = recorder.get_logger().info if complete else recorder.get_logger().warning
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")
     rclpy.try_shutdown()
-    return int(missing)
+    return int(not complete)

@@ -4,8 +4,12 @@ Names in the bag are taken relative to the node's namespace, so `-r __ns:=/again
 match; only /clock stays where it is.
 """
 
+import re
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +23,17 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.playback import Playback, episode_times
 from keepaway_sim.bags.reader import BagReader
-from keepaway_sim.bags.topics import Recorded
+from keepaway_sim.bags.timeline import Timeline
+from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.subscribing import declared, message_class, to_profile
+from keepaway_sim.wire import cdr
 from keepaway_sim.wire.messages import SECOND
 
 HISTORY = 2000
@@ -48,6 +56,8 @@ class Settings:
     end: float = -1.0  # simulated time to end before [s]; -1: the bag's end
     episodes: str = ""  # play only these, like 7 or 3-9
     topics: str = ""  # play only these, comma-separated; empty: all
+    match: int = 0  # number of the match, from 1 on, where the bag has several; 0: the only one
+    as_recorded: bool = False  # play also what has another definition than the installed one
     loop: bool = False  # begin again at the end
     paused: bool = False  # wait for the services resume or step
     start_delay: float = 0.5  # wall time between what is latched and the rest [s]
@@ -60,7 +70,8 @@ class Settings:
     def times(self) -> tuple[int | None, int | None]:
         """From when on and before when to play [ns]."""
         if self.episodes:
-            return episode_times(self.path, *_range(self.episodes))
+            bag = MatchBag(self.path, self.match or None)
+            return episode_times(bag, *_range(self.episodes))
         return (
             None if self.start < 0 else round(self.start * SECOND),
             None if self.end < 0 else round(self.end * SECOND),
@@ -87,10 +98,10 @@ class Replayer(Node):
         """
         super().__init__("replayer", **node_options)
         self.settings = declared(self, Settings, changeable=("rate",))
-        self._reader = BagReader(self.settings.path)
-        topics = self.settings.recorded_topics() or list(self._reader.topics)
+        timeline = Timeline.of_bag(BagReader(self.settings.path), self.settings.match)
+        topics = self._playable(timeline)
         self.playback = Playback(
-            self._reader,
+            timeline,
             self.settings.rate,
             *self.settings.times(),
             topics,
@@ -98,7 +109,9 @@ class Replayer(Node):
         )
         if self.settings.paused:
             self.playback.pause()
-        self._publishers_by_topic = {topic: self._make_publisher(topic) for topic in topics}
+        self._publishers_by_topic = {
+            name: self._make_publisher(timeline.topics[name]) for name in topics
+        }
         self.add_on_set_parameters_callback(self._on_parameters)
         for name, action in (
             ("pause", self.playback.pause),
@@ -133,8 +146,32 @@ class Replayer(Node):
         for publisher in self._publishers_by_topic.values():
             publisher.wait_for_all_acked(Duration(seconds=LONGEST_LINGER))
 
-    def _make_publisher(self, name: str) -> Publisher:
-        topic = self._reader.topics[name]
+    def _playable(self, timeline: Timeline) -> list[str]:
+        """The topics to play: those asked for that are of installed types.
+
+        Raises:
+            KeepawayError: one of another definition than the installed one, or none is left.
+        """
+        wanted = self.settings.recorded_topics() or list(timeline.topics)
+        playable = []
+        for name in wanted:
+            topic = timeline.topics.get(name)
+            try:
+                difference = difference_from_installed(topic) if topic else ""
+            except KeepawayError as error:
+                self.get_logger().warning(f"{name} is left out: {str(error).splitlines()[0]}")
+                continue
+            if difference and not self.settings.as_recorded:
+                raise KeepawayError(
+                    f"{name}: {difference}; --as-recorded true plays its bytes all the same"
+                )
+            playable.append(name)
+        if not playable:
+            raise KeepawayError(f"{timeline.reader.path}: no topic of an installed type")
+        return playable
+
+    def _make_publisher(self, topic: Topic) -> Publisher:
+        name = topic.name
         here = name if name == "/clock" else name.lstrip("/")
         return self.create_publisher(
             message_class(topic.message_type), here, to_profile(topic.qos, HISTORY)
@@ -175,13 +212,56 @@ class Replayer(Node):
         return serve
 
 
+def difference_from_installed(topic: Topic) -> str:
+    """How a recorded topic's type differs from the installed one; empty where it does not.
+
+    Raises:
+        KeepawayError: its type is not installed, or it is not ROS 2's.
+    """
+    if not topic.is_ros:
+        raise KeepawayError(f"its messages are not ROS 2's ({topic.schema_encoding or 'no type'})")
+    message_class(topic.message_type)
+    installed = cdr.codec(topic.message_type)
+    hash_ = cdr.type_hash(topic.message_type)
+    try:
+        recorded = cdr.Codec(topic.message_type, topic.definition)
+    except (ValueError, RecursionError):
+        return f"its definition of {topic.message_type} cannot be read"
+    if topic.type_hash not in ("", hash_) or not recorded.is_laid_out_like(installed):
+        return f"it was recorded with another {topic.message_type} than the installed one"
+    return ""
+
+
 def _range(text: str) -> tuple[int, int]:
     """The first and the last of "7" or "3-9"."""
-    first, _, last = text.partition("-")
+    found = re.fullmatch(r"\s*(\d{1,9})(?:-(\d{1,9}))?\s*", text)
+    if not found or int(found[2] or found[1]) < int(found[1]):
+        raise KeepawayError(f"episodes={text!r}: write 7 or 3-9")
+    return int(found[1]), int(found[2] or found[1])
+
+
+@contextmanager
+def stoppable(executor: Any) -> Iterator[Callable[[float], None]]:
+    """Lets ROS spin until SIGINT or SIGTERM comes; then the next spin is a KeyboardInterrupt.
+
+    Before the block SIGTERM simply ends the process: nothing has begun that must be ended.
+    """
+    stop = threading.Event()
+
+    def spin(seconds: float) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        executor.spin_once(timeout_sec=seconds)
+
+    before = [
+        (number, signal.signal(number, lambda *_: stop.set()))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    ]
     try:
-        return int(first), int(last or first)
-    except ValueError:
-        raise KeepawayError(f"episodes={text!r}: write 7 or 3-9") from None
+        yield spin
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
 
 
 def main(args: list[str] | None = None) -> int:
@@ -190,13 +270,14 @@ def main(args: list[str] | None = None) -> int:
     Returns:
         0, or 2 where it cannot be played.
     """
-    rclpy.init(args=args)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         replayer = Replayer()
         executor = EventsExecutor()
         executor.add_node(replayer)
-        count = replayer.play(lambda seconds: executor.spin_once(timeout_sec=seconds))
-        replayer.linger()
+        with stoppable(executor) as spin:
+            count = replayer.play(spin)
+            replayer.linger()
         replayer.get_logger().info(f"said {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
         get_logger("replayer").error(str(error))

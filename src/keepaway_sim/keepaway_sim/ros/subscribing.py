@@ -45,11 +45,13 @@ def message_class(message_type: str) -> type[Any]:
     Raises:
         KeepawayError: it is not installed.
     """
-    package, _, name = message_type.split("/")
+    package, _, name = [*message_type.split("/"), "", ""][:3]
     try:
+        if f"{package}/msg/{name}" != message_type or not name.isidentifier():
+            raise ImportError("not a type's name")
         return getattr(importlib.import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
-    except (ImportError, AttributeError) as error:
-        raise KeepawayError(f"{message_type} is not installed: {error}") from error
+    except (ImportError, AttributeError, ValueError) as error:
+        raise KeepawayError(f"{message_type[:100]!r} is not installed: {error}") from error
 
 
 def listen(node: Node, topic: str, message_type: str, qos: QoSProfile) -> Subscription:

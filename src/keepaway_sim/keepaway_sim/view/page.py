@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from keepaway_sim.bags.checked import check_match
+from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Task
@@ -89,7 +91,7 @@ def encoded(rows: np.ndarray) -> str:
 
 def match_data(match: Mapping[str, Any], facts: Sequence[str] = ()) -> dict[str, Any]:
     """What the page must know of a match (a Match message's fields)."""
-    task = Task(*(match[n] for n in ("num_keepers", "num_takers", "field_length", "field_width")))
+    task = check_match(match)
     starts, size = layout(task)
     angle = math.degrees(match["visible_angle"])
     return {
@@ -124,33 +126,41 @@ def episode_data(episode: EpisodeSummary) -> dict[str, Any]:
 
 
 def replay_page(
-    path: Path | str, numbers: Collection[int] | None = None, max_cycles: int = MAX_CYCLES
-) -> str:
-    """The page of a bag, all in one text.
+    path: Path | str,
+    numbers: Collection[int] | None = None,
+    max_cycles: int = MAX_CYCLES,
+    number: int | None = None,
+) -> tuple[str, str]:
+    """The page of a bag, all in one text; and what the bag misses, in words.
 
     Args:
         path: the bag.
         numbers: the episodes that can be watched; by default some, spread over the match. All
             are in the list and in the learning curve.
         max_cycles: of the default choice together.
+        number: of the match, from 1 on, where the bag has several.
 
     Raises:
         KeepawayError: no such bag, or no such episodes in it.
     """
-    bag = MatchBag(path)
+    bag = MatchBag(path, number)
     episodes = list(bag.episodes())
     rest = bag.unfinished()
-    if rest is not None and rest.number not in {e.number for e in episodes}:
+    if rest is not None:
         episodes.append(rest)
     wanted = chosen_episodes(episodes, numbers, max_cycles)
-    entries = []
-    for episode in episodes:
-        entry = episode_data(episode)
-        if episode.number in wanted:
-            entry["frames"] = encoded(frames(bag.track(episode), bag.task))
-        entries.append(entry)
-    facts = [f"{role} {policy}" for role, policy in _policies(bag.reader.info).items()]
-    return page({"live": False, "match": match_data(bag.match, facts), "episodes": entries})
+    shown = {
+        episode.number: encoded(frames(track, bag.task))
+        for episode, track in bag.tracks([e for e in episodes if e.number in wanted])
+    }
+    entries = [
+        episode_data(e) | ({"frames": shown[e.number]} if e.number in shown else {})
+        for e in episodes
+    ]
+    gaps = count_gaps(bag).report()
+    facts = [f"{role} {policy}" for role, policy in _policies(bag.agents).items()]
+    data = {"live": False, "match": match_data(bag.match, [*facts, gaps]), "episodes": entries}
+    return page(data), gaps
 
 
 def page(data: Mapping[str, Any]) -> str:
@@ -160,7 +170,7 @@ def page(data: Mapping[str, Any]) -> str:
         "title": html.escape(f"Keepaway {match['task']}" if match else "Keepaway, live"),
         "css": _part("page.css"),
         "script": _part("page.js"),
-        "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+        "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
     made = _part("page.html")
     for name, text in parts.items():
@@ -191,9 +201,8 @@ def chosen_episodes(
     return {episode.number for episode in episodes[::every]}
 
 
-def _policies(info: Mapping[str, str]) -> dict[str, str]:
+def _policies(agents: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Who played how, where the bag says so and all of a team are alike."""
-    agents: dict[str, dict[str, Any]] = json.loads(info.get("agents", "{}"))
     teams: dict[str, set[str]] = {}
     for name, settings in agents.items():
         teams.setdefault(name.split("_")[0] + "s", set()).add(str(settings.get("policy", "hand")))

@@ -12,6 +12,7 @@ rmw_fastrtps use it; https://mcap.dev/spec/registry for `ros2msg`.
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import os
 import re
@@ -36,6 +37,8 @@ _SIZES = {
 }  # fmt: skip
 _PRIMITIVES = {name: struct.Struct("<" + code) for name, code in _SIZES.items()}
 _COUNT = _PRIMITIVES["uint32"]
+_MOST_FIELDS = 10_000
+"""Of one message, those of the messages inside it counted in: definitions can nest without end."""
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?:<=)?(?P<size>\d*)\])?\s+"
     r"(?P<name>[a-z]\w*)(?:\s+(?P<default>\S.*))?$"
@@ -92,7 +95,7 @@ class Codec:
             raise KeepawayError(f"{self.message_type}: not little-endian CDR: {data[:4]!r}")
         try:
             return self._read(_Cursor(data), self._root)
-        except (struct.error, UnicodeDecodeError, RecursionError) as error:
+        except (struct.error, ValueError, OverflowError, RecursionError) as error:
             raise KeepawayError(f"{len(data)} bytes are no {self.message_type}: {error}") from error
 
     def dtype(self, lengths: Mapping[str, int], size: int = 0) -> np.dtype[np.void]:
@@ -108,16 +111,22 @@ class Codec:
         Raises:
             KeepawayError: the message has strings or sequences of messages.
         """
-        names, formats, offsets = [], [], []
-        position = len(HEADER)
-        for name, format_, alignment in self._leaves(self._root, "", lengths):
-            position = _aligned(position, alignment)
-            names.append(name)
-            formats.append(format_)
-            offsets.append(position)
-            position += np.dtype(format_).itemsize
-        size = size or _aligned(position, PAYLOAD)
-        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+        try:
+            return self._laid_out(self._leaves(self._root, "", lengths), size)
+        except (RecursionError, OverflowError, ValueError, MemoryError) as error:
+            raise KeepawayError(f"{self.message_type} has no layout: {error}") from error
+
+    def head(self) -> np.dtype[np.void]:
+        """The fields at a message's front that are at the same place in every message.
+
+        Raises:
+            KeepawayError: the definition nests without end.
+        """
+        try:
+            front = list(itertools.takewhile(self._is_fixed, self._root))
+            return self._laid_out(self._leaves(front, "", {}), 0)
+        except (RecursionError, OverflowError, ValueError, MemoryError) as error:
+            raise KeepawayError(f"{self.message_type} has no layout: {error}") from error
 
     def lengths(self, values: Mapping[str, Any]) -> dict[str, int]:
         """The lengths of a decoded message's sequences, for `dtype`."""
@@ -135,6 +144,33 @@ class Codec:
         for name, length in lengths.items():
             messages[f"{name}.length"] = length
         return messages
+
+    def is_laid_out_like(self, other: Codec) -> bool:
+        """Whether the same bytes mean the same to both, field by field and name by name."""
+        return self._messages == other._messages
+
+    def _is_fixed(self, field: Field) -> bool:
+        """Whether it has the same length in every message, and is not an array of messages."""
+        if field.type in _PRIMITIVES:
+            return not field.is_array or field.size is not None
+        if field.type == "string" or field.is_array:
+            return False
+        return all(map(self._is_fixed, self._messages[field.type]))
+
+    @staticmethod
+    def _laid_out(leaves: Iterator[tuple[str, Any, int]], size: int) -> np.dtype[np.void]:
+        names, formats, offsets = [], [], []
+        position = len(HEADER)
+        for name, format_, alignment in leaves:
+            position = _aligned(position, alignment)
+            names.append(name)
+            formats.append(format_)
+            offsets.append(position)
+            position += np.dtype(format_).itemsize
+            if len(names) > _MOST_FIELDS:
+                raise OverflowError(f"more than {_MOST_FIELDS} fields")
+        size = size or _aligned(position, PAYLOAD)
+        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
     def _write(self, out: bytearray, fields: Sequence[Field], values: Mapping[str, Any]) -> None:
         unknown = values.keys() - {field.name for field in fields}
@@ -165,6 +201,7 @@ class Codec:
     def _read(self, cursor: _Cursor, fields: Sequence[Field]) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for field in fields:
+            cursor.spend()
             if not field.is_array:
                 values[field.name] = self._read_one(cursor, field.type)
                 continue
@@ -174,6 +211,7 @@ class Codec:
                 values[field.name] = cursor.unpack_many(_PRIMITIVES[field.type], count)
             else:
                 values[field.name] = [self._read_one(cursor, field.type) for _ in range(count)]
+                cursor.spend(count)
         return values
 
     def _read_one(self, cursor: _Cursor, type_: str) -> Any:
@@ -292,10 +330,19 @@ def _fields(message_type: str, text: str) -> list[Field]:
         found = _FIELD.match(entry)
         if not found:
             raise KeepawayError(f"{message_type}: cannot read {line.strip()!r}")
-        size = int(found["size"]) if found["size"] and "<=" not in found["array"] else None
+        size = _array_size(message_type, found)
         type_ = _resolved(found["type"], package)
         fields.append(Field(found["name"], type_, found["array"] is not None, size))
     return fields
+
+
+def _array_size(message_type: str, found: re.Match[str]) -> int | None:
+    """How many entries an array of fixed size has; None for a sequence, and for no array."""
+    if not found["size"] or "<=" in found["array"]:
+        return None
+    if len(found["size"]) > 9:
+        raise KeepawayError(f"{message_type}: {found['name']} has {found['size'][:9]}.. entries")
+    return int(found["size"])
 
 
 def _resolved(type_: str, package: str) -> str:
@@ -323,6 +370,13 @@ class _Cursor:
 
     def __init__(self, data: bytes) -> None:
         self._data, self._position = data, len(HEADER)
+        self._left = len(data) + _MOST_FIELDS
+
+    def spend(self, count: int = 1) -> None:
+        """Refuse a message of endlessly many fields: empty ones take no bytes."""
+        self._left -= count
+        if self._left < 0:
+            raise struct.error("more fields than bytes")
 
     def unpack(self, number: struct.Struct) -> Any:
         start = _aligned(self._position, number.size)

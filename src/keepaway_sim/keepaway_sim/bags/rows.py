@@ -1,0 +1,97 @@
+"""Messages of a block as structured arrays: their fronts, or all of them by known lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.wire.cdr import HEADER, PAYLOAD, Codec, codec
+
+
+def fronts(layout: Codec, data: bytes, rows: np.ndarray) -> np.ndarray:
+    """(n,) the fixed fields that messages begin with.
+
+    Args:
+        layout: of the messages.
+        data, rows: of a block, rows of this type only.
+
+    Raises:
+        KeepawayError: a message that is shorter.
+    """
+    return _taken(layout, layout.head(), data, rows)
+
+
+def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, int]) -> np.ndarray:
+    """(n,) messages whose sequences have these lengths, as an array of `Codec.dtype`.
+
+    Raises:
+        KeepawayError: a message whose sequences have not.
+    """
+    taken = _taken(layout, layout.dtype(lengths), data, rows)
+    for name, length in lengths.items():
+        found = taken[f"{name}.length"]
+        if (found != length).any():
+            other = int(found[found != length][0])
+            raise KeepawayError(f"{layout.message_type}: {other} {name}, where {length} should be")
+    sizes = rows[:, 3] - rows[:, 2]
+    if (sizes > taken.itemsize + PAYLOAD).any():
+        raise KeepawayError(f"{layout.message_type} of {int(sizes.max())} bytes, longer than it is")
+    return taken
+
+
+def check_fields(layout: Codec, names: tuple[str, ...], lengths: Mapping[str, int]) -> None:
+    """Whether a definition in a bag has the fields that reading needs, of the types they have.
+
+    Raises:
+        KeepawayError: it has not.
+    """
+    ours = codec(layout.message_type).dtype(lengths)
+    known = {name: length for name, length in lengths.items() if _has_sequence(layout, name)}
+    theirs = layout.dtype(known)
+    for name in names:
+        if name not in (theirs.names or ()):
+            raise KeepawayError(f"its definition of {layout.message_type} lacks {name}")
+        if theirs[name] != ours[name]:
+            raise KeepawayError(f"{name} of its {layout.message_type} has another type")
+
+
+def _has_sequence(layout: Codec, name: str) -> bool:
+    return f"{name}.length" in (layout.dtype({}).names or ())
+
+
+def _taken(layout: Codec, dtype: np.dtype[np.void], data: bytes, rows: np.ndarray) -> np.ndarray:
+    """(n,) of a dtype, without the bytes that pad a message's end: not all writers write them."""
+    unpadded = _without_padding(dtype)
+    size = unpadded.itemsize
+    if not len(rows):
+        return np.zeros(0, unpadded)
+    raw = np.frombuffer(data, np.uint8)
+    if (rows[:, 3] - rows[:, 2] < size).any() or size > len(raw):
+        raise KeepawayError(f"a {layout.message_type} of fewer than its {size} bytes")
+    taken = np.lib.stride_tricks.sliding_window_view(raw, size)[rows[:, 2]]
+    if (taken[:, :2] != list(HEADER[:2])).any():
+        raise KeepawayError(f"a {layout.message_type} that is not little-endian CDR")
+    made: np.ndarray = taken.view(unpadded)[:, 0]
+    return made
+
+
+def lengths(layout: Codec, data: bytes, rows: np.ndarray, name: str) -> np.ndarray:
+    """(n,) the lengths of a sequence, the first one in the message."""
+    found: np.ndarray = _taken(layout, layout.dtype({}), data, rows)[f"{name}.length"]
+    return found
+
+
+def _without_padding(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
+    fields = {name: (entry[0], entry[1]) for name, entry in (dtype.fields or {}).items()}
+    size = max((offset + kind.itemsize for kind, offset in fields.values()), default=len(HEADER))
+    layout: Any = {
+        "names": list(fields),
+        "formats": [kind for kind, _ in fields.values()],
+        "offsets": [offset for _, offset in fields.values()],
+        "itemsize": size,
+    }
+    unpadded: np.dtype[np.void] = np.dtype(layout)
+    return unpadded
