@@ -158,7 +158,7 @@ def replay_page(
         for e in episodes
     ]
     gaps = count_gaps(bag).report()
-    facts = [f"{role} {policy}" for role, policy in _policies(bag.agents).items()]
+    facts = _who_played(bag)
     data = {"live": False, "match": match_data(bag.match, [*facts, gaps]), "episodes": entries}
     return page(data), gaps
 
@@ -201,11 +201,21 @@ def chosen_episodes(
     return {episode.number for episode in episodes[::every]}
 
 
+def _who_played(bag: MatchBag) -> list[str]:
+    """How each team played, or why that is not known: the match can be watched all the same."""
+    try:
+        return [f"{role} {policy}" for role, policy in _policies(bag.agents).items()]
+    except KeepawayError as error:
+        return [str(error)]
+
+
 def _policies(agents: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Who played how, where the bag says so and all of a team are alike."""
     teams: dict[str, set[str]] = {}
     for name, settings in agents.items():
-        teams.setdefault(name.split("_")[0] + "s", set()).add(str(settings.get("policy", "hand")))
+        teams.setdefault(name.split("_")[0] + "s", set()).add(
+            str(settings.get("policy", "hand"))[:40]
+        )
     return {team: policies.pop() for team, policies in teams.items() if len(policies) == 1}
 
 
