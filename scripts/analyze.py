@@ -17,11 +17,11 @@ from pathlib import Path
 from keepaway_sim.analysis.report import analyse
 from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
+from keepaway_transfer import metrics
 from keepaway_transfer.errors import TransferError
-from keepaway_transfer.reports import metrics
 from keepaway_transfer.reports.kwy import read_kwy
 from keepaway_transfer.reports.report import write_report
-from keepaway_transfer.studies.results import read_results
+from keepaway_transfer.studies.results import pack, read_results
 
 
 def main() -> int:
@@ -37,10 +37,11 @@ def main() -> int:
         results = read_results(arguments.results)
         out = arguments.out or arguments.results
         print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
+        pack(arguments.results, out)
     except (TransferError, KeepawayError, FileNotFoundError) as error:
         print(f"analyze: {error}", file=sys.stderr)
         return 1
-    print(f"Written to {out}: trials.csv, table.md and four figures.")
+    print(f"Written to {out}: table.md, figures and all they are made of, trials.parquet.")
     return 0
 
 

@@ -33,7 +33,8 @@ from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import Progress, StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
-from keepaway_transfer.reports import metrics, plotting
+from keepaway_transfer import metrics
+from keepaway_transfer.reports import plotting
 from keepaway_transfer.reports.statistics import mean_curve
 from keepaway_transfer.rho import Transfer, transferred
 

@@ -30,7 +30,7 @@ from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.batch import play
 from keepaway_transfer.studies.experiment import Progress, run
 from keepaway_transfer.studies.processes import WorkerExecutor
-from keepaway_transfer.studies.results import open_results
+from keepaway_transfer.studies.results import open_results, pack
 from keepaway_transfer.studies.study import Study, load_study
 
 log = logging.getLogger("study")
@@ -78,6 +78,7 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
                 bar.update()
                 if bar.disable:  # the output is no terminal
                     log.info("%s", progress)
+    pack(arguments.out)
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
     return 0
 

@@ -27,7 +27,24 @@ def test_a_results_folder_gets_its_report(tmp_path):
     done = analyze(tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "| row | trials | reached |" in done.stdout
-    assert {path.name for path in tmp_path.iterdir()} >= {"table.md", "trials.csv"}
+    assert {path.name for path in tmp_path.iterdir()} >= {"table.md", "trials.parquet"}
+
+
+def test_a_report_elsewhere_is_one_that_can_be_analysed_again(tmp_path):
+    run, published, again = (tmp_path / name for name in ("run", "published", "again"))
+    with open_results(
+        run, load_study("tiny"), command="scripts/study.py tiny", code_version="v1"
+    ) as results:
+        for row in ("0", "4"):
+            for number in range(2):
+                cycles = (40, 50, 60, 70, 80 + number)
+                results.append(Trial(row, number, (), cycles, (60,), "v1"))
+    assert analyze(run, "--out", published).returncode == 0
+    assert analyze(published, "--out", again).returncode == 0
+    names = {path.name for path in published.iterdir()}
+    assert names >= {"study.json", "trials.parquet", "table.md", "learning_curves.png"}
+    for name in names:
+        assert (again / name).read_bytes() == (published / name).read_bytes()
 
 
 def test_a_log_is_told_when_it_reached_the_threshold(tmp_path):

@@ -11,7 +11,7 @@ import psutil  # type: ignore[import-untyped]  # comes with distributed
 import pytest
 from distributed import LocalCluster
 
-from keepaway_transfer.studies.results import read_results
+from keepaway_transfer.studies.results import read_results, read_trials
 from keepaway_transfer.studies.study import load_study
 
 SCRIPT = Path(__file__).parents[2] / "scripts/study.py"
@@ -28,7 +28,7 @@ def study(*arguments):
 
 
 def trials_in(folder):
-    return sorted(read_results(folder).trials, key=lambda trial: trial.key)
+    return sorted(read_trials(folder), key=lambda trial: trial.key)
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +43,8 @@ def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
     assert done.returncode == 0, done.stderr
     assert len(trials_in(folder)) == 12
     assert "study: 12/12 trials, time left 0 min" in done.stderr
+    assert (folder / "trials.parquet").exists()
+    assert len(read_results(folder).records) == 12
     head = json.loads((folder / "study.json").read_text())
     assert head["command"].startswith("scripts/study.py tiny")
     assert head["study"]["seed"] == TINY.seed

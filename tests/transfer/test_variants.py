@@ -3,13 +3,21 @@
 import numpy as np
 import pytest
 
+from keepaway_agent.actions import Role
+from keepaway_agent.learning.cmac import make_tiling
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES
-from keepaway_transfer.parts import PARTS, level_of
-from keepaway_transfer.variants import VARIANTS, variant_of
+from keepaway_transfer.parts import PARTS, level_of, sample_of
+from keepaway_transfer.variants import VARIANTS, constant, variant_of
 
-COPIED = np.random.default_rng(0).normal(0.2, 0.1, size=(4, 19, 14, 32))
+TILING = make_tiling(Role.KEEPER, 4, 3)
+SAMPLE = sample_of("4v3", TILING)
+COPIED = np.random.default_rng(0).normal(0.2, 0.1, size=TILING.weights_shape(4))
 COPIED[:, :, 9:] = 0  # never learned
+
+
+def changed(text):
+    return variant_of(text).changed(COPIED, 13 / 19, lambda: SAMPLE)
 
 
 def test_every_part_alone_and_every_pair_has_a_name():
@@ -24,19 +32,19 @@ def test_every_variant_has_a_rule_that_there_is():
 
 @pytest.mark.parametrize("name", sorted(VARIANTS))
 def test_a_level_can_be_set_for_every_variant(name):
-    changed = variant_of(f"{name}@5").changed(COPIED, 13 / 19)
-    shifted = variant_of(f"{name}@8").changed(COPIED, 13 / 19)
+    low, high = changed(f"{name}@5"), changed(f"{name}@8")
     if VARIANTS[name].scaled:
-        np.testing.assert_allclose(shifted, changed * 8 / 5)
+        np.testing.assert_allclose(high, low * 8 / 5)
     else:
-        np.testing.assert_allclose(shifted - changed, 30 / (19 * 32))  # 3 s over all tiles
+        np.testing.assert_allclose(high - low, 30 / (19 * 32))  # 3 s over all tiles
 
 
 def test_optimistic_is_a_constant_at_the_level_set_or_at_that_of_the_copied_weights():
-    own, five = (variant_of(name).changed(COPIED, 1.0) for name in ("optimistic", "optimistic@5"))
+    own, five = changed("optimistic"), changed("optimistic@5")
     assert np.ptp(own) == np.ptp(five) == 0
-    assert level_of(own) == pytest.approx(level_of(COPIED))
-    assert level_of(five) == pytest.approx(5.0)
+    assert level_of(own, SAMPLE) == pytest.approx(level_of(COPIED, SAMPLE))
+    assert level_of(five, SAMPLE) == pytest.approx(5.0)
+    np.testing.assert_array_equal(five, constant(5.0, COPIED.shape))
 
 
 def test_only_a_constant_of_a_set_level_needs_no_source():
@@ -45,10 +53,12 @@ def test_only_a_constant_of_a_set_level_needs_no_source():
     assert not VARIANTS["optimistic"].needs_no_source
 
 
-def test_averaged_weights_have_their_level_alone_where_nothing_was_learned():
-    shape = variant_of("averaged_shape").changed(COPIED, 1.0)
-    assert np.abs(shape[:, :, 9:]).max() < 1e-13
-    assert np.abs(shape[:, :, :9]).max() > 1e-3
+@pytest.mark.parametrize("name", ["rho", "rho_averaged", "rescaled", "partial"])
+def test_without_a_level_no_sample_of_states_is_asked_for(name):
+    def no_sample():
+        raise AssertionError
+
+    assert variant_of(name).changed(COPIED, 1.0, no_sample).any()
 
 
 @pytest.mark.parametrize(

@@ -5,45 +5,55 @@ variables. In every state 32 tiles of each variable are active, and an action's 
 
     Q(s, a) = sum over i, and over the 32 tiles j active in s, of w(a, i, j)
 
-Let c be the mean of all weights that are not zero, and m(i, j) the mean of w(a, i, j) over the
-actions. Every weight is then the sum of three::
+Let L be the mean of Q(s, a) over all actions and over a sample of states that is fixed for each
+task, let c = L / (32 n), and let m(i, j) be the mean of w(a, i, j) over the actions. Every weight
+is then the sum of three::
 
     w(a, i, j) = c  +  (m(i, j) - c)  +  (w(a, i, j) - m(i, j))
                 level      shape              preferences
 
-and because Q is linear in the weights, so is every value the sum of three values: the level
-32 n c, the same in every state for every action; the shape, which tells states apart and is the
-same for all actions; and the preferences, which tell actions apart and sum to zero over them.
+and because Q is linear in the weights, so is every value the sum of three values: the level L, the
+same in every state for every action; the shape, which tells states apart, is the same for all
+actions and has the mean 0 over the sample; and the preferences, which tell actions apart and sum to
+0 over them in every state.
 
-The mean is over weights that are not zero because only those were ever learned; it is also what
-averaging puts in place of the others (Taylor, Stone & Liu 2007), so averaged weights have no shape
-and no preferences where nothing was learned. It is a mean over tiles, not over the states of play:
-tiles that were seldom seen count as much as others.
+The sample (`scripts/checks/reference_states.py`) is of states in which keepers have a choice when
+they choose at random. A mean over tiles is no stand-in for it: tiles that were hardly ever seen
+count there as much as others, and it comes out a third lower than the values met in play.
 
 Weights are worth cycles, levels are given in seconds.
 
->>> weights = np.zeros((2, 1, 2, 32))
+>>> from keepaway_agent.learning.cmac import make_tiling
+>>> from keepaway_agent.actions import Role
+>>> tiling = make_tiling(Role.KEEPER, 2, 1)
+>>> weights = np.zeros(tiling.weights_shape(2))
 >>> weights[0], weights[1] = 1.0, 3.0
->>> level_of(weights)  # 32 weights of 2 are active on average: 64 cycles
-6.4
->>> kept(weights, ("preferences",))[:, 0, 0, 0].tolist()
+>>> sample = sample_of("2v1", tiling)
+>>> level_of(weights, sample)  # 7 variables, 32 active tiles of each, at 2 cycles: 448 cycles
+44.8
+>>> kept(weights, sample, ("preferences",))[:, 0, 0, 0].tolist()
 [-1.0, 1.0]
->>> kept(weights, ("preferences",), level=3.2)[:, 0, 0, 0].tolist()
-[0.0, 2.0]
+>>> kept(weights, sample, ("preferences",), level=44.8)[:, 0, 0, 0].round(9).tolist()
+[1.0, 3.0]
 """
 
 from collections.abc import Collection
+from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keepaway_agent.learning.cmac import NUM_TILINGS
+from keepaway_agent.learning.cmac import NUM_TILINGS, Tiling, state_cells
 from keepaway_sim.world.config import CYCLE_TIME
+from keepaway_transfer.errors import MappingError
 
 PARTS = ("level", "shape", "preferences")
+STATES_FILE = Path(__file__).with_name("reference_states.npz")
 
 Weights = NDArray[np.float64]
+Sample = NDArray[np.int64]  # (num_states, num_features), the fine cells of the sample's states
 
 
 class Split(NamedTuple):
@@ -54,24 +64,45 @@ class Split(NamedTuple):
     preferences: Weights  # (num_actions, num_features, num_tiles, num_tilings)
 
 
-def split(weights: Weights) -> Split:
+@cache
+def sample_of(task: str, tiling: Tiling) -> Sample:
+    """The sample of states of a task, in a keeper's tiling of it.
+
+    The states are of 25 m x 25 m; on another field they are taken as they are.
+
+    Raises:
+        MappingError: no states of this task were drawn.
+    """
+    with np.load(STATES_FILE) as drawn:
+        if task not in drawn:
+            raise MappingError(
+                f"no reference states of {task}, which a level is a mean over: there are those of"
+                f" {', '.join(drawn)}"
+            )
+        return np.array([state_cells(state, tiling) for state in drawn[task]])
+
+
+def split(weights: Weights, sample: Sample) -> Split:
     """The three parts of weights, (num_actions, num_features, num_tiles, num_tilings)."""
-    level = _mean_learned(weights)
+    level = _mean_weight(weights, sample)
     over_actions = weights.mean(axis=0, keepdims=True)
     return Split(level, over_actions - level, weights - over_actions)
 
 
-def kept(weights: Weights, parts: Collection[str], level: float | None = None) -> Weights:
+def kept(
+    weights: Weights, sample: Sample, parts: Collection[str], level: float | None = None
+) -> Weights:
     """The weights with some of their parts only.
 
     Args:
         weights: (num_actions, num_features, num_tiles, num_tilings).
+        sample: that the level is a mean over.
         parts: names of PARTS.
         level: [s] instead of the weights' own, whether or not that is among the parts.
     """
     if set(parts) == set(PARTS) and level is None:
         return weights
-    found = split(weights)
+    found = split(weights, sample)
     constant = found.level if "level" in parts else 0.0
     if level is not None:
         constant = weight_of(level, weights.shape[1])
@@ -83,18 +114,18 @@ def kept(weights: Weights, parts: Collection[str], level: float | None = None) -
     return result
 
 
-def scaled(weights: Weights, level: float) -> Weights:
+def scaled(weights: Weights, sample: Sample, level: float) -> Weights:
     """The weights times the number that brings their level to this one [s].
 
     Weights without a level of their own become constant.
     """
-    own, asked = _mean_learned(weights), weight_of(level, weights.shape[1])
+    own, asked = _mean_weight(weights, sample), weight_of(level, weights.shape[1])
     return weights * (asked / own) if own else np.full(weights.shape, asked)
 
 
-def level_of(weights: Weights) -> float:
+def level_of(weights: Weights, sample: Sample) -> float:
     """What an action is worth on average [s]: the value that the level alone gives it."""
-    return float(_mean_learned(weights) * NUM_TILINGS * weights.shape[1] * CYCLE_TIME)
+    return float(_mean_weight(weights, sample) * NUM_TILINGS * weights.shape[1] * CYCLE_TIME)
 
 
 def weight_of(level: float, num_features: int) -> float:
@@ -102,6 +133,10 @@ def weight_of(level: float, num_features: int) -> float:
     return level / CYCLE_TIME / (NUM_TILINGS * num_features)
 
 
-def _mean_learned(weights: Weights) -> float:
-    learned = weights[weights != 0]
-    return float(learned.mean()) if learned.size else 0.0
+def _mean_weight(weights: Weights, sample: Sample) -> float:
+    """The mean weight of all tiles that are active in the sample."""
+    flat = weights.mean(axis=0).reshape(weights.shape[1], -1)
+    sums = np.pad(np.cumsum(flat, axis=1), ((0, 0), (1, 0)))
+    variables = np.arange(weights.shape[1])
+    windows = sums[variables, sample + NUM_TILINGS] - sums[variables, sample]
+    return float(windows.mean() / NUM_TILINGS)

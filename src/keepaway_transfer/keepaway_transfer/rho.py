@@ -20,6 +20,7 @@ from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES, InterTaskMapping, actions, state_variables
+from keepaway_transfer.parts import sample_of
 from keepaway_transfer.variants import RHO, Variant, variant_of
 
 Weights = NDArray[np.float64]
@@ -112,7 +113,7 @@ def rho(
         (num_actions, num_features, num_tiles, num_tilings) of the target.
 
     Raises:
-        MappingError: weights or tilings that are not of the mapping's tasks.
+        MappingError: weights or tilings that are not of the mapping's tasks; or as the variant.
     """
     _check_tasks(weights, source, target, mapping)
     known = weights.reshape(*weights.shape[:2], -1)
@@ -124,7 +125,8 @@ def rho(
             if of_source >= 0 and source_action >= 0:
                 flat[action, variable] = known[source_action, of_source, tiles]
     mapped = sum(index >= 0 for index in mapping.variable_indices)
-    return variant.changed(carried, source.num_features / mapped if mapped else 1.0)
+    scale = source.num_features / mapped if mapped else 1.0
+    return variant.changed(carried, scale, lambda: sample_of(mapping.target, target))
 
 
 def nearest_tiles(

@@ -8,13 +8,13 @@ Variant(rule='rho', averaged=True, rescaled=False, scaled=False, parts=('level',
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from keepaway_transfer.errors import MappingError
-from keepaway_transfer.parts import PARTS, Weights, kept, scaled
+from keepaway_transfer.parts import PARTS, Sample, Weights, kept, scaled, weight_of
 
 LEVEL_SIGN = "@"
 
@@ -35,21 +35,37 @@ class Variant:
         """Does it give the same whatever was learned before?"""
         return self.parts == ("level",) and self.level is not None
 
-    def changed(self, carried: Weights, scale: float) -> Weights:
+    @property
+    def needs_sample(self) -> bool:
+        """Is a level to be found in the copied weights?"""
+        return self.scaled or self.parts != PARTS or self.level is not None
+
+    def changed(self, carried: Weights, scale: float, sample: Callable[[], Sample]) -> Weights:
         """What becomes of copied weights.
 
         Args:
             carried: (num_actions, num_features, num_tiles, num_tilings) of the target.
             scale: state variables of the source over mapped ones of the target: an action's value
                 is a sum over state variables.
+            sample: gives the states of the target that a level is a mean over.
+
+        Raises:
+            MappingError: a level is needed, and there is no sample of the target's states.
         """
         if self.rescaled:
             carried = carried * scale
         if self.averaged and carried.any():
             carried = np.where(carried == 0, carried[carried != 0].mean(), carried)
+        if not self.needs_sample:
+            return carried
         if self.scaled:
-            return scaled(carried, self.level or 0.0)
-        return kept(carried, self.parts, self.level)
+            return scaled(carried, sample(), self.level or 0.0)
+        return kept(carried, sample(), self.parts, self.level)
+
+
+def constant(level: float, shape: tuple[int, int, int, int]) -> Weights:
+    """Weights that value every action of every state at this level [s]."""
+    return np.full(shape, weight_of(level, shape[1]))
 
 
 RHO = Variant()
@@ -69,7 +85,7 @@ VARIANTS: Mapping[str, Variant] = {
     "rho_level_shape": Variant(parts=("level", "shape")),
     "rho_level_preferences": Variant(parts=("level", "preferences")),
     "rho_shape_preferences": Variant(parts=("shape", "preferences")),
-    # The same after averaging: nothing but the level where nothing was learned.
+    # The same after averaging.
     "averaged_shape": Variant(averaged=True, parts=("shape",)),
     "averaged_preferences": Variant(averaged=True, parts=("preferences",)),
     "averaged_shape_preferences": Variant(averaged=True, parts=("shape", "preferences")),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from keepaway_transfer.errors import LogError
+from keepaway_transfer.metrics import time_to_threshold
 from keepaway_transfer.reports.kwy import read_kwy, write_kwy
-from keepaway_transfer.reports.metrics import time_to_threshold
 
 HERE = Path(__file__).parent
 REFERENCE = Path(__file__).parents[4] / "shared/reference/ut_learning_trial_3v2_20x20.kwy"

@@ -1,15 +1,16 @@
 """From trials to the table: hand-worked times, censored trials kept, and what is refused."""
 
-import csv
+import dataclasses
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from scipy import stats
 
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.reports.summary import measure_trials, summarise
-from keepaway_transfer.studies.results import Results, SourceRun, Trial
+from keepaway_transfer.studies.results import Results, SourceRun, Trial, record_of
 from keepaway_transfer.studies.study import Row, Stage, Study
 
 HOUR = 36_000  # [cycles]
@@ -35,7 +36,16 @@ def trial(row, number, hours, *, reaches=True, source_hours=0.0):
 
 
 def results(*trials, study=STUDY):
-    return Results(study, "scripts/study.py worked", "v1", trials)
+    records = tuple(record_of(one, study) for one in trials)
+    return Results(study, "scripts/study.py worked", "v1", records)
+
+
+def differences(study, first, second):
+    """What the third row of a study has against the second."""
+    trials = [trial("0", number, 8 + 0.5 * number) for number in range(len(first))]
+    trials += [trial("a", k, hours, source_hours=0.5) for k, hours in enumerate(first)]
+    trials += [trial("b", k, hours, source_hours=0.5) for k, hours in enumerate(second)]
+    return summarise(study, measure_trials(results(*trials, study=study)))[2].against["a"]
 
 
 @pytest.fixture
@@ -52,7 +62,19 @@ def test_each_trial_is_measured_from_its_own_episodes(worked):
     assert (last.row, last.source_episodes, last.source_hours) == ("10", 10, 0.5)
     assert last.total_hours == last.target_hours + 0.5 == 5.0
     assert last.greedy_performance == 9.0
-    assert first.asymptotic_performance == 1800.0
+
+
+def test_what_trials_hold_at_their_end_is_told_only_where_they_do_not_stop_at_the_threshold():
+    stopping, going_on = STUDY, dataclasses.replace(STUDY, min_hours=10.0)
+    for study, expected in ((stopping, [np.nan] * 2), (going_on, [1800.0] * 2)):
+        trials = [trial("0", 0, 6), trial("0", 1, 8)]
+        found = measure_trials(results(*trials, study=study))
+        np.testing.assert_equal([one.asymptotic_performance for one in found], expected)
+
+
+def test_trials_of_which_none_reached_the_threshold_did_not_stop_there():
+    found = measure_trials(results(trial("0", 0, 6, reaches=False)))
+    assert found[0].asymptotic_performance == 900.0
 
 
 def test_a_trial_that_never_reached_the_threshold_counts_with_the_limit(worked):
@@ -74,7 +96,7 @@ def test_the_rows_have_restricted_means_and_shares_reached(worked):
     assert scratch.target.estimate == pytest.approx((5.5 + 7.5 + 10) / 3)
     assert after.target.estimate == pytest.approx((2.5 + 3.5 + 4.5) / 3)
     assert after.total.estimate == pytest.approx(after.target.estimate + 0.5)
-    assert after.jumpstart.estimate == pytest.approx(0.0, abs=150)
+    assert after.initial.estimate == pytest.approx(after.initial.low, abs=150)
 
 
 def test_a_row_is_compared_with_the_reference_by_hours_saved(worked):
@@ -86,31 +108,56 @@ def test_a_row_is_compared_with_the_reference_by_hours_saved(worked):
     assert saved.target_holm == saved.target.p_value  # one row, nothing to adjust
 
 
-def test_rows_that_share_their_sources_have_intervals_of_pairs():
-    rows = (Row("0"), Row("a", (Stage("3v2", 10),)), Row("b", (Stage("3v2", 10),)))
-    study = Study(
-        name="shared", target="4v3", rows=rows, references=("0", "a"), threshold=1000.0, seed=3,
-        window=2, max_hours=10.0, shared_sources=True,
-    )  # fmt: skip
-    trials = [trial("0", number, 8 + 0.5 * number) for number in range(3)]
-    for number in range(3):  # b is an hour faster than a, whatever the source is worth
-        trials.append(trial("a", number, 4 + 2 * number, source_hours=0.5))
-        trials.append(trial("b", number, 3 + 2 * number, source_hours=0.5))
-    against = summarise(study, measure_trials(results(*trials, study=study)))[2].against["a"]
-    assert (against.target.low, against.target.high) == (1.0, 1.0)
-    assert against.target.p_value > 0.05  # Welch knows nothing of the pairs
+ROWS = (Row("0"), Row("a", (Stage("3v2", 10),)), Row("b", (Stage("3v2", 20),)))
+INDEPENDENT = dataclasses.replace(STUDY, rows=ROWS, references=("0", "a"))
+SHARED = dataclasses.replace(INDEPENDENT, shared_sources=True)
 
 
-def test_the_report_has_a_line_a_trial_a_table_and_figures(worked, tmp_path):
+def test_rows_that_share_their_sources_are_tested_as_pairs():
+    # b is an hour faster than a, whatever the source is worth.
+    against = differences(SHARED, first=[4, 6, 8], second=[3, 5, 7])
+    assert against.pairs == 3
+    assert against.target == against.total == (1.0, 1.0, 1.0, 0.0)
+
+
+def test_pairs_are_tested_by_the_paired_t_test():
+    first, second = np.array([4, 6, 8, 5.5]), np.array([3, 5.5, 6, 5])
+    against = differences(SHARED, first, second)
+    by_hand = stats.ttest_rel(first, second)
+    assert against.target.p_value == pytest.approx(by_hand.pvalue)
+    assert against.target[1:3] == pytest.approx(tuple(by_hand.confidence_interval()))
+
+
+def test_rows_of_other_sources_are_tested_by_welch():
+    first, second = np.array([4, 6, 8, 5.5]), np.array([3, 5.5, 6, 5])
+    against = differences(INDEPENDENT, first, second)
+    assert against.pairs == 0
+    by_hand = stats.ttest_ind(first, second, equal_var=False)
+    assert against.target.p_value == pytest.approx(by_hand.pvalue)
+
+
+def test_trials_without_a_partner_are_no_pairs():
+    against = differences(SHARED, first=[4, 6, 8, 12], second=[3, 5, 7])
+    assert against.pairs == 3
+    assert against.target.difference == 1.0
+
+
+def test_the_jumpstart_takes_neither_rows_mean_as_known():
+    def starting(row, number, cycles):
+        return Trial(row, number, (), (cycles, *(HOUR // 2,) * 4), (), "v1")
+
+    scratch, after = [9000, 9400, 9600], [12000, 12800, 12600]
+    trials = [starting("0", k, cycles) for k, cycles in enumerate(scratch)]
+    trials += [starting("10", k, cycles) for k, cycles in enumerate(after)]
+    found = summarise(STUDY, measure_trials(results(*trials)))[1].against["0"].jumpstart
+    means = [np.array([(one + 4 * HOUR / 2) / 50 for one in row]) for row in (after, scratch)]
+    by_hand = stats.ttest_ind(*means, equal_var=False)
+    assert found.difference == pytest.approx(means[0].mean() - means[1].mean())
+    assert found[1:3] == pytest.approx(tuple(by_hand.confidence_interval()))
+
+
+def test_the_report_has_a_table_and_figures(worked, tmp_path):
     text = write_report(worked, tmp_path)
-    with open(tmp_path / "trials.csv", newline="") as file:
-        lines = list(csv.DictReader(file))
-    assert [(line["row"], line["trial"], line["reached"]) for line in lines[:3]] == [
-        ("0", "0", "True"),
-        ("0", "1", "True"),
-        ("0", "2", "False"),
-    ]
-    assert lines[0]["target_hours"] == "5.5000"
     assert (tmp_path / "table.md").read_text() == text
     assert "| 10 | 3 | 3 | 0.50 | 3.50 [" in text
     assert "Made by `scripts/study.py worked`: study worked, seed 3, code v1, 6 trials." in text
@@ -125,6 +172,24 @@ def test_a_lower_threshold_is_measured_on_the_same_trials(worked):
 def test_a_threshold_that_the_trials_were_not_run_to_is_refused(worked):
     with pytest.raises(StudyError, match="the trials stopped at 1000 s"):
         measure_trials(worked, threshold=1200.0)
+
+
+def test_a_report_of_records_without_episodes_has_no_curves(worked, tmp_path):
+    bare = [dataclasses.replace(one, blocks=(), first=(), last=()) for one in worked.records]
+    text = write_report(dataclasses.replace(worked, records=tuple(bare), note="Old."), tmp_path)
+    assert "| 10 | 3 | 3 | 0.50 | 3.50 [" in text
+    assert text.endswith("6 trials. Old.\n")
+    assert {path.stem for path in tmp_path.glob("*.png")} == {"time_to_threshold", "share_reached"}
+    with pytest.raises(StudyError, match="only the times to 1000 s are known"):
+        measure_trials(dataclasses.replace(worked, records=tuple(bare)), threshold=800.0)
+
+
+def test_what_the_trials_could_have_shown_is_told_in_hours(worked, tmp_path):
+    hours = [5.5, 7.5, 10.0]
+    text = write_report(worked, tmp_path)
+    assert (
+        f"3 times from scratch have a standard deviation of {np.std(hours, ddof=1):.2f} h" in text
+    )
 
 
 def test_results_without_a_scratch_trial_are_refused():

@@ -92,19 +92,27 @@ def test_the_mean_curve_ends_where_the_first_trial_stopped():
     ]
 
 
-def test_drawing_whole_clusters_widens_the_interval_when_trials_share_a_source(generator):
-    by_source = np.repeat(generator.normal(0, 1, size=20), 10)  # ten equal trials a source
-    sources = np.repeat(np.arange(20), 10)
-    alone = statistics.clustered_bootstrap(by_source, np.arange(200), generator)
-    clustered = statistics.clustered_bootstrap(by_source, sources, generator)
-    ratio = (clustered.high - clustered.low) / (alone.high - alone.low)
-    assert ratio == pytest.approx(math.sqrt(10), rel=0.1)
+def test_pairs_by_hand():
+    # Differences 1, 2, 3: mean 2, standard error 1 / sqrt(3), t = 2 sqrt(3) of 2 degrees.
+    comparison = statistics.paired([2, 5, 9], [1, 3, 6])
+    assert comparison.difference == 2.0
+    assert comparison.high - 2.0 == pytest.approx(4.302653 / math.sqrt(3))
+    assert comparison.p_value == pytest.approx(0.0741799)
 
 
 def test_pairing_removes_what_a_source_gives_to_both_rows(generator):
-    source = generator.normal(0, 5, size=50)
-    interval = statistics.paired_bootstrap(source + 1.0, source, generator)
-    assert interval == pytest.approx((1.0, 1.0, 1.0))
+    source, noise = generator.normal(0, 5, size=50), generator.normal(0, 0.1, size=50)
+    comparison = statistics.paired(source + 1.0 + noise, source)
+    assert comparison.low == pytest.approx(1.0, abs=0.1)
+    assert comparison.high == pytest.approx(1.0, abs=0.1)
+
+
+def test_one_value_has_no_error():
+    assert statistics.mean_and_error([3.0]) == (3.0, None)
+
+
+def test_what_is_not_known_has_no_interval(generator):
+    assert np.isnan(statistics.bootstrap_mean([1.0, np.nan], generator)).all()
 
 
 def test_holm_multiplies_the_smallest_by_the_number_of_rows():

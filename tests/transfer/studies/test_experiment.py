@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keepaway_transfer.studies.experiment import Progress, plan, run
-from keepaway_transfer.studies.results import Trial, open_results, read_results
+from keepaway_transfer.studies.results import Trial, open_results, read_trials
 from keepaway_transfer.studies.study import load_study
 
 TINY = load_study("tiny")
@@ -60,22 +60,18 @@ def test_rows_that_share_their_sources_are_played_together():
 def test_a_run_yields_and_writes_every_trial(tmp_path):
     trials = run_all(tmp_path, play)
     assert sorted(trial.key for trial in trials) == sorted(KEYS)
-    assert sorted(read_results(tmp_path).trials, key=lambda t: t.key) == sorted(
-        trials, key=lambda t: t.key
-    )
+    assert sorted(read_trials(tmp_path), key=lambda t: t.key) == sorted(trials, key=lambda t: t.key)
 
 
 def test_a_run_that_was_interrupted_goes_on_and_repeats_nothing(tmp_path):
     with pytest.raises(InterruptedError):
         run_all(tmp_path / "cut", Power(2).play)
-    before = [trial.key for trial in read_results(tmp_path / "cut").trials]
+    before = [trial.key for trial in read_trials(tmp_path / "cut")]
     after = [trial.key for trial in run_all(tmp_path / "cut", play, resume=True)]
     assert len(before) == 6  # a batch of 3 of each of two rows
     assert sorted(before + after) == sorted(KEYS)
     run_all(tmp_path / "whole", play)
-    assert set(read_results(tmp_path / "cut").trials) == set(
-        read_results(tmp_path / "whole").trials
-    )
+    assert set(read_trials(tmp_path / "cut")) == set(read_trials(tmp_path / "whole"))
 
 
 def test_a_run_keeps_no_trial_that_is_on_the_disk(tmp_path):

@@ -2,13 +2,21 @@
 
 import dataclasses
 import fcntl
-import gzip
 import multiprocessing
 
 import pytest
 
 from keepaway_transfer.errors import StudyError
-from keepaway_transfer.studies.results import SourceRun, Trial, open_results, read_results
+from keepaway_transfer.studies.records import block_of, read_records
+from keepaway_transfer.studies.results import (
+    SourceRun,
+    Trial,
+    open_results,
+    pack,
+    read_results,
+    read_trials,
+    record_of,
+)
 from keepaway_transfer.studies.study import load_study
 
 STUDY = load_study("tiny")
@@ -34,7 +42,8 @@ def append(folder, *numbers, **options):
 def test_what_was_appended_is_read_with_its_study_and_command(tmp_path):
     append(tmp_path, 0, 1)
     results = read_results(tmp_path)
-    assert results.trials == (trial(0), trial(1))
+    assert tuple(read_trials(tmp_path)) == (trial(0), trial(1))
+    assert results.records == (record_of(trial(0), STUDY), record_of(trial(1), STUDY))
     assert results.study == STUDY
     assert results.command == "scripts/study.py tiny"
 
@@ -48,23 +57,23 @@ def test_going_on_knows_what_is_done(tmp_path):
 def test_a_trial_is_on_disk_before_the_next_one(tmp_path):
     with opened(tmp_path) as results:
         results.append(trial(0))
-        assert len(read_results(tmp_path).trials) == 1
+        assert len(read_results(tmp_path).records) == 1
 
 
 def test_half_a_line_of_a_killed_writer_is_cut_off(tmp_path):
     append(tmp_path, 0)
     with open(tmp_path / "trials.jsonl", "a") as file:
         file.write('{"row":"4","num')
-    assert len(read_results(tmp_path).trials) == 1
+    assert len(read_results(tmp_path).records) == 1
     append(tmp_path, 1, resume=True)
-    assert read_results(tmp_path).trials == (trial(0), trial(1))
+    assert tuple(read_trials(tmp_path)) == (trial(0), trial(1))
 
 
 def test_results_are_not_touched_without_resume(tmp_path):
     append(tmp_path, 0)
     with pytest.raises(StudyError, match="add --resume to go on, or name another folder"):
         append(tmp_path, 1)
-    assert len(read_results(tmp_path).trials) == 1
+    assert len(read_results(tmp_path).records) == 1
 
 
 def test_a_changed_setting_is_refused_by_name(tmp_path):
@@ -79,13 +88,13 @@ def test_other_code_is_refused_unless_it_is_said_not_to_matter(tmp_path):
     with pytest.raises(StudyError, match=r"begun with code 0\.1\.0\+gabc, this is 0\.1\.0\+gdef"):
         append(tmp_path, 1, resume=True, code_version="0.1.0+gdef")
     append(tmp_path, 1, resume=True, code_version="0.1.0+gdef", any_code=True)
-    assert len(read_results(tmp_path).trials) == 2
+    assert len(read_results(tmp_path).records) == 2
 
 
 def test_more_trials_are_no_changed_setting(tmp_path):
     append(tmp_path, 0)
     append(tmp_path, 1, study=dataclasses.replace(STUDY, trials=9), resume=True)
-    assert len(read_results(tmp_path).trials) == 2
+    assert len(read_results(tmp_path).records) == 2
 
 
 def _try_to_open(folder, answers):
@@ -106,27 +115,67 @@ def test_a_second_writer_is_refused(tmp_path):
         other.join()
 
 
-def test_packed_trials_are_read(tmp_path):
+def test_packed_trials_are_read_without_the_others(tmp_path):
     append(tmp_path, 0, 1)
-    plain = tmp_path / "trials.jsonl"
-    (tmp_path / "trials.jsonl.gz").write_bytes(gzip.compress(plain.read_bytes()))
-    plain.unlink()
-    assert read_results(tmp_path).trials == (trial(0), trial(1))
+    before = read_results(tmp_path)
+    pack(tmp_path)
+    (tmp_path / "trials.jsonl").unlink()
+    assert read_results(tmp_path) == before
 
 
-def test_trials_that_are_added_to_packed_ones_are_read_with_them(tmp_path):
+def test_a_study_goes_on_where_its_packed_trials_end(tmp_path):
     append(tmp_path, 0, 1)
-    plain = tmp_path / "trials.jsonl"
-    (tmp_path / "trials.jsonl.gz").write_bytes(gzip.compress(plain.read_bytes()))
-    with opened(tmp_path, resume=True) as results:  # packed, and the plain file kept (gzip -k)
-        assert results.done == {("4", 0), ("4", 1)}
-    plain.unlink()
+    pack(tmp_path)
+    (tmp_path / "trials.jsonl").unlink()
     with opened(tmp_path, resume=True) as results:
         assert results.done == {("4", 0), ("4", 1)}
         results.append(trial(2))
-    assert read_results(tmp_path).trials == (trial(0), trial(1), trial(2))
-    with opened(tmp_path, resume=True) as results:
-        assert results.done == {("4", 0), ("4", 1), ("4", 2)}
+    pack(tmp_path)
+    assert [record.number for record in read_results(tmp_path).records] == [0, 1, 2]
+    assert [record.number for record in read_records(tmp_path / "trials.parquet")] == [0, 1, 2]
+
+
+def test_results_packed_into_another_folder_are_results(tmp_path):
+    append(tmp_path / "run", 0, 1)
+    pack(tmp_path / "run", tmp_path / "published")
+    assert read_results(tmp_path / "published") == read_results(tmp_path / "run")
+    assert {path.name for path in (tmp_path / "published").iterdir()} == {
+        "study.json",
+        "trials.parquet",
+    }
+
+
+def test_packing_again_gives_the_same_bytes(tmp_path):
+    append(tmp_path, 1, 0)
+    first = pack(tmp_path).read_bytes()
+    assert pack(tmp_path).read_bytes() == first
+
+
+def test_a_record_keeps_blocks_and_the_first_and_last_episodes(tmp_path):
+    study = dataclasses.replace(STUDY, window=1000, threshold=9.0)
+    cycles = tuple(range(10, 2000))
+    record = record_of(Trial("0", 0, (), cycles, (50, 70), "v1"), study)
+    assert (record.block, len(record.blocks)) == (
+        50,
+        39,
+    )  # 1,990 episodes: the last 40 are no block
+    assert record.blocks[1] == sum(range(60, 110))
+    assert (record.first, record.last) == (cycles[:100], cycles[-100:])
+    assert record.initial == pytest.approx(5.95)
+    assert record.greedy == pytest.approx(6.0)
+    assert record.crossing_episodes == 1000  # the first window has a mean of 50.95 s
+
+
+@pytest.mark.parametrize("window", [1, 2, 5, 19, 20, 70, 200, 1000])
+def test_a_window_is_a_whole_number_of_blocks(window):
+    assert window % block_of(window) == 0
+
+
+def test_a_file_that_is_no_packed_trials_is_refused_with_its_path(tmp_path):
+    append(tmp_path, 0)
+    (tmp_path / "trials.parquet").write_bytes(b"PAR1 and nothing more")
+    with pytest.raises(StudyError, match=r"trials\.parquet: not a Parquet file"):
+        read_results(tmp_path)
 
 
 def _begin(folder, threshold, barrier, answers):
@@ -157,7 +206,7 @@ def test_of_two_studies_that_begin_one_folder_at_once_one_is_refused(tmp_path):
     assert any("another process" in str(each) or "has results" in str(each) for each in said)
     results = read_results(tmp_path / "out")
     assert results.study.threshold == began
-    assert results.trials == (trial(0),)
+    assert results.records == (record_of(trial(0), results.study),)
 
 
 def test_a_file_system_without_locks_is_said_and_used(tmp_path, monkeypatch, caplog):
@@ -167,7 +216,7 @@ def test_a_file_system_without_locks_is_said_and_used(tmp_path, monkeypatch, cap
     monkeypatch.setattr(fcntl, "flock", flock)
     append(tmp_path, 0)
     assert "cannot be locked" in caplog.text
-    assert read_results(tmp_path).trials == (trial(0),)
+    assert tuple(read_trials(tmp_path)) == (trial(0),)
 
 
 def test_a_folder_without_results_is_refused(tmp_path):

@@ -6,6 +6,7 @@ import pytest
 
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.study import FOLDER, Row, Stage, load_study, study_from
+from keepaway_transfer.variants import VARIANTS, variant_of
 
 PLAIN = {
     "name": "mine",
@@ -28,13 +29,35 @@ def test_table2_has_the_papers_rows_threshold_and_window():
     assert {row.variant for row in study.rows} == {"rho"}
 
 
-def test_rho_variants_compares_at_a_thousand_episodes_with_scratch_and_with_rho():
-    study = load_study("rho_variants")
-    assert study.references == ("scratch", "rho")
-    assert {row.source_episodes for row in study.rows[1:]} == {1000}
-    assert {"rho_modified", "rho_averaged", "rescaled", "shuffled"} <= {
-        row.variant for row in study.rows
-    }
+@pytest.mark.parametrize("episodes", [1000, 6000])
+def test_the_variants_compare_with_scratch_with_rho_and_with_an_optimistic_start(episodes):
+    study = load_study(f"variants_{episodes}")
+    assert study.references == ("scratch", "rho", "optimistic at 5 s")
+    assert study.shared_sources
+    assert {row.source_episodes for row in study.rows} == {0, episodes}
+    used = {row.variant.partition("@")[0] for row in study.rows}
+    assert used >= set(VARIANTS) - {"averaged_shape", "averaged_preferences"}
+
+
+def test_the_optimistic_study_learns_from_no_source():
+    study = load_study("optimistic")
+    assert not any(row.stages for row in study.rows)
+    levels = [variant_of(row.variant).level for row in study.rows]
+    assert levels == [None, 2, 5, 8, 12, 20]
+
+
+@pytest.mark.parametrize("name", ["table2_averaged", "table2_rescaled", "table2_at_5"])
+def test_tables_of_other_ways_have_the_sources_of_table2(name):
+    table2, other = load_study("table2"), load_study(name)
+    assert other.rows[0] == table2.rows[0]
+    for mine, papers in zip(other.rows[1:], table2.rows[1:], strict=True):
+        assert other.source_name(mine, 0) == table2.source_name(papers, 0)
+    assert len({row.variant for row in other.rows[1:]} - {"rho"}) == 1
+
+
+def test_all_studies_of_the_package_have_one_seed():
+    seeds = {load_study(path.stem).seed for path in FOLDER.glob("*.toml") if path.stem != "tiny"}
+    assert seeds == {2005}
 
 
 def test_fivevfour_goes_through_4v3_and_through_3v2_and_4v3():

@@ -1,16 +1,16 @@
-"""A study's results for people: its table, its figures and a line of numbers for every trial."""
+"""A study's results for people: its table and its figures."""
 
-import csv
-import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from keepaway_transfer.reports import metrics, plotting, statistics
-from keepaway_transfer.reports.statistics import Interval
+from keepaway_transfer import metrics
+from keepaway_transfer.reports import plotting, statistics
+from keepaway_transfer.reports.statistics import Comparison, Interval
 from keepaway_transfer.reports.summary import (
+    EQUIVALENT_HOURS,
     RowSummary,
     TrialMeasures,
     checked_threshold,
@@ -18,8 +18,10 @@ from keepaway_transfer.reports.summary import (
     seconds,
     summarise,
     values,
+    verdict,
 )
-from keepaway_transfer.studies.results import Results, Trial
+from keepaway_transfer.studies.records import Record
+from keepaway_transfer.studies.results import Results
 from keepaway_transfer.studies.study import Row, Study
 
 SHOWN_TRIALS = 5  # single learning curves a row, as in the paper's Figure 3
@@ -29,22 +31,25 @@ CURVE_POINTS = 400
 def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
     """The rows as Markdown: first what they gave, then how they compare with each reference."""
     lines = [
-        "| row | trials | reached | source hours | target hours | total hours | jumpstart (s)"
-        " | asymptotic (s) | greedy (s) | transfer ratio |",
+        "| row | trials | reached | source hours | target hours | total hours"
+        " | first episodes (s) | at the end (s) | greedy (s) | transfer ratio |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         lines.append(
             f"| {row.name} | {row.trials} | {row.reached} | {row.source_hours:.2f}"
-            f" | {_spread(row.target)} | {_spread(row.total)} | {_spread(row.jumpstart)}"
-            f" | {_spread(row.asymptotic)} | {_spread(row.greedy)} | {row.transfer_ratio:+.3f} |"
+            f" | {spread(row.target)} | {spread(row.total)} | {spread(row.initial)}"
+            f" | {spread(row.asymptotic)} | {spread(row.greedy)}"
+            f" | {_number(row.transfer_ratio, '+.3f')} |"
         )
     lines += [
         "",
         f"Hours to a mean duration of {threshold:g} s over {study.window:,} episodes of"
         f" {study.target}; trials that did not reach it within {study.max_hours:g} h count with"
         " that time (restricted mean). In brackets: 95 % intervals (target hours from the"
-        " Kaplan-Meier curve, the others by bootstrap).",
+        " Kaplan-Meier curve, the others by bootstrap over trials). First episodes: the first"
+        f" {metrics.FIRST_EPISODES}. At the end: the last {study.window:,}, where trials do not"
+        " stop at the threshold.",
     ]
     for reference in study.references:
         if any(reference in row.against for row in rows):
@@ -59,7 +64,9 @@ def write_report(
     threshold: float | None = None,
     curves: Sequence[str] = (),
 ) -> str:
-    """Write `trials.csv`, `table.md` and the figures into a folder; files there are replaced.
+    """Write `table.md` and the figures into a folder; files there are replaced.
+
+    Figures that need episodes are left out where the records have none.
 
     Args:
         results: that were read.
@@ -72,13 +79,12 @@ def write_report(
         the table.
     """
     folder, study = Path(folder), results.study
-    threshold = checked_threshold(study, threshold)
+    threshold = checked_threshold(results, threshold)
     measures = measure_trials(results, threshold)
     rows = summarise(study, measures)
-    made_by = _made_by(results, measures)
+    made_by = _made_by(results)
     folder.mkdir(parents=True, exist_ok=True)
-    _write_csv(folder / "trials.csv", measures)
-    text = f"{table(study, rows, threshold)}\n{_power(measures, study)}\n\n{made_by}\n"
+    text = f"{table(study, rows, threshold)}\n{power(measures, study)}\n\n{made_by}\n"
     (folder / "table.md").write_text(text, encoding="utf-8")
     drawn = [study.references[0], *(curves or _best(rows, study.references[0]))]
     for name, figure in _figures(results, measures, rows, drawn, threshold).items():
@@ -86,68 +92,63 @@ def write_report(
     return text
 
 
-def _spread(interval: Interval) -> str:
-    if np.isnan(interval.estimate):
+def spread(estimate: Interval | Comparison) -> str:
+    """An estimate with its interval in brackets; a dash if it is not known."""
+    if np.isnan(estimate[0]):
         return "-"
-    return f"{interval.estimate:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
+    return f"{estimate[0]:.2f} [{estimate[1]:.2f}, {estimate[2]:.2f}]"
+
+
+def power(measures: Sequence[TrialMeasures], study: Study) -> str:
+    """What the trials at hand could have shown, from the spread of the scratch row."""
+    hours = values([one for one in measures if one.row == study.references[0]], "target_hours")
+    if len(hours) < 2 or np.ptp(hours) == 0:
+        return "The times from scratch have no spread: nothing is known of what the trials show."
+    deviation = float(np.std(hours, ddof=1))
+    seen = statistics.detectable_effect(len(hours), deviation)
+    needed = statistics.trials_needed(EQUIVALENT_HOURS, deviation)
+    return (
+        f"Power: the {len(hours)} times from scratch have a standard deviation of {deviation:.2f}"
+        f" h; two independent rows of {len(hours)} trials show a difference of {seen:.1f} h with"
+        f" 80 % power at 5 %, and one of {EQUIVALENT_HOURS:g} h takes {needed} trials a row."
+    )
+
+
+def _number(value: float, form: str) -> str:
+    return "-" if np.isnan(value) else format(value, form)
 
 
 def _comparison_table(rows: Sequence[RowSummary], reference: str) -> list[str]:
     lines = [
-        f"Against row {reference} (p adjusted by Holm over the rows):",
+        f"Against row {reference} (p by the paired t-test where trials are pairs, else by Welch's;"
+        f" adjusted by Holm over the rows). `none` is said of intervals within {EQUIVALENT_HOURS:g}"
+        " h on both sides.",
         "",
-        "| row | target hours saved | p (Welch) | p (log-rank) | total hours saved | p (Welch) |",
-        "|---|---|---|---|---|---|",
+        "| row | pairs | target hours saved | p | p (log-rank) | | total hours saved | p | "
+        "| longer at first (s) | p |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         if (found := row.against.get(reference)) is not None:
-            target, total = Interval(*found.target[:3]), Interval(*found.total[:3])
             lines.append(
-                f"| {row.name} | {_spread(target)} | {found.target_holm:.2g}"
-                f" | {found.logrank_holm:.2g} | {_spread(total)} | {found.total_holm:.2g} |"
+                f"| {row.name} | {found.pairs or '-'} | {spread(found.target)}"
+                f" | {found.target_holm:.2g} | {found.logrank_holm:.2g}"
+                f" | {verdict(found.target, found.target_holm)}"
+                f" | {spread(found.total)} | {found.total_holm:.2g}"
+                f" | {verdict(found.total, found.total_holm)}"
+                f" | {spread(found.jumpstart)} | {found.jumpstart_holm:.2g} |"
             )
     return lines
 
 
-def _power(measures: Sequence[TrialMeasures], study: Study) -> str:
-    """What the trials at hand could have shown, from the spread of the scratch row."""
-    hours = values([one for one in measures if one.row == study.references[0]], "target_hours")
-    variation = float(np.std(hours) / np.mean(hours))
-    if variation == 0:
-        return "The trials from scratch all took the same time: nothing is known of their spread."
-    needed = statistics.trials_needed(0.1, variation)
-    text = (
-        f"Power: the times from scratch have a coefficient of variation of {variation:.2f}; to see"
-        f" a difference of 10 % with 80 % power at 5 % takes {needed} trials a row"
-    )
-    if len(hours) < 2:
-        return f"{text}."
-    seen = statistics.detectable_effect(len(hours), variation)
-    return f"{text}, and {len(hours)} show one of {100 * seen:.0f} %."
-
-
-def _made_by(results: Results, measures: Sequence[TrialMeasures]) -> str:
+def _made_by(results: Results) -> str:
     study = results.study
-    versions = ", ".join(sorted({one.code_version for one in measures}))
-    return (
+    versions = ", ".join(sorted({one.code_version for one in results.records}))
+    made_by = (
         f"Made by `{results.command}`: study {study.name}, seed {study.seed}, code {versions},"
-        f" {len(measures)} trials."
+        f" {len(results.records)} trials."
     )
-
-
-def _write_csv(path: Path, measures: Sequence[TrialMeasures]) -> None:
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        names = [entry.name for entry in dataclasses.fields(TrialMeasures)]
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(_csv_row, measures))
-
-
-def _csv_row(measures: TrialMeasures) -> dict[str, object]:
-    return {
-        name: f"{value:.4f}" if isinstance(value, float) else value
-        for name, value in dataclasses.asdict(measures).items()
-    }
+    return f"{made_by} {results.note}" if results.note else made_by
 
 
 def _best(rows: Sequence[RowSummary], scratch: str) -> list[str]:
@@ -164,43 +165,46 @@ def _figures(
     threshold: float,
 ) -> dict[str, Figure]:
     study = results.study
-    by_name = {row.name: row for row in study.rows}
-    trials = {name: [one for one in results.trials if one.row == name] for name in drawn}
-    labels = {name: _label(by_name[name]) for name in drawn}
-    reached = {
-        row.name: statistics.kaplan_meier(
-            [one.target_hours for one in measures if one.row == row.name],
-            [one.reached for one in measures if one.row == row.name],
-        )
-        for row in rows
-    }
-    hours = np.linspace(0, max(_hours_run(trials)), CURVE_POINTS + 1)[1:]
     goal = f"Time to a mean of {threshold:g} s in {study.target}"
-    scratch = next(row.target for row in rows if row.name == study.references[0])
-    return {
-        "learning_curves": plotting.learning_curves(
-            hours,
-            {labels[name]: _curves(trials[name], hours, study.window) for name in drawn},
-            threshold,
-            f"Learning {study.target}",
-        ),
+    figures = {
         "time_to_threshold": plotting.time_to_threshold(
             [row.name for row in rows],
             [row.target for row in rows],
             [row.total for row in rows],
-            scratch,
+            next(row.target for row in rows if row.name == study.references[0]),
             title=goal,
             rows_are=_amount_of(study) or "Way of transfer",
             connected=bool(_amount_of(study)),
         ),
-        "share_reached": plotting.share_reached(reached, study.max_hours, goal),
+        "share_reached": plotting.share_reached(_reached(measures, rows), study.max_hours, goal),
+    }
+    records = {name: [one for one in results.records if one.row == name] for name in drawn}
+    if all(one.has_episodes for row in records.values() for one in row):
+        figures |= _episode_figures(study, records, threshold)
+    return figures
+
+
+def _episode_figures(
+    study: Study, records: dict[str, list[Record]], threshold: float
+) -> dict[str, Figure]:
+    by_name = {row.name: row for row in study.rows}
+    labels = {name: _label(by_name[name]) for name in records}
+    longest = max(one.hours for row in records.values() for one in row)
+    hours = np.linspace(0, longest, CURVE_POINTS + 1)[1:]
+    return {
+        "learning_curves": plotting.learning_curves(
+            hours,
+            {labels[name]: _curves(row, hours, study.window) for name, row in records.items()},
+            threshold,
+            f"Learning {study.target}",
+        ),
         "durations": plotting.durations(
             {
                 labels[name]: (
-                    _pooled(trials[name], slice(0, metrics.FIRST_EPISODES)),
-                    _pooled(trials[name], slice(-metrics.FIRST_EPISODES, None)),
+                    seconds([cycles for one in row for cycles in one.first]),
+                    seconds([cycles for one in row for cycles in one.last]),
                 )
-                for name in drawn
+                for name, row in records.items()
             },
             f"Episodes of {study.target}: first (dotted) and last {metrics.FIRST_EPISODES} of each"
             " trial",
@@ -208,9 +212,21 @@ def _figures(
     }
 
 
+def _reached(
+    measures: Sequence[TrialMeasures], rows: Sequence[RowSummary]
+) -> dict[str, statistics.SurvivalCurve]:
+    return {
+        row.name: statistics.kaplan_meier(
+            [one.target_hours for one in measures if one.row == row.name],
+            [one.reached for one in measures if one.row == row.name],
+        )
+        for row in rows
+    }
+
+
 def _label(row: Row) -> str:
     if not row.stages:
-        return "from scratch"
+        return "from scratch" if row.is_scratch else f"from a constant ({row.variant})"
     before = ", ".join(f"{stage.episodes:,} episodes of {stage.task}" for stage in row.stages)
     return f"after {before}" + (f" ({row.variant})" if row.variant != "rho" else "")
 
@@ -225,22 +241,16 @@ def _amount_of(study: Study) -> str:
     return ""
 
 
-def _hours_run(trials: dict[str, list[Trial]]) -> list[float]:
-    return [metrics.hours(seconds(trial.cycles)) for row in trials.values() for trial in row]
-
-
-def _curves(trials: Sequence[Trial], hours: metrics.Floats, window: int) -> plotting.CurveGroup:
+def _curves(records: Sequence[Record], hours: metrics.Floats, window: int) -> plotting.CurveGroup:
     """All trials' mean curve, and a few trials evenly spread from the fastest to the slowest."""
-    ordered = sorted(trials, key=lambda trial: sum(trial.cycles))
+    ordered = sorted(records, key=lambda one: one.hours)
     curves = np.array(
         [
-            metrics.learning_curve(seconds(trial.cycles), hours, window, metrics.FIRST_EPISODES)
-            for trial in ordered
+            metrics.learning_curve(
+                seconds(one.blocks), hours, window, metrics.FIRST_EPISODES, one.block
+            )
+            for one in ordered
         ]
     )
     shown = np.linspace(0, len(ordered) - 1, min(SHOWN_TRIALS, len(ordered))).round().astype(int)
     return plotting.CurveGroup(curves[shown], statistics.mean_curve(curves))
-
-
-def _pooled(trials: Sequence[Trial], episodes: slice) -> metrics.Floats:
-    return np.concatenate([seconds(trial.cycles[episodes]) for trial in trials])

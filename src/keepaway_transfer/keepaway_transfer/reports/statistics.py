@@ -68,16 +68,41 @@ def welch(first: ArrayLike, second: ArrayLike, confidence: float = CONFIDENCE) -
     return Comparison(float(one.mean() - other.mean()), float(low), float(high), float(test.pvalue))
 
 
+def paired(first: ArrayLike, second: ArrayLike, confidence: float = CONFIDENCE) -> Comparison:
+    """The paired t-test of mean(first) - mean(second), two-sided: entry i of both is a pair.
+
+    Differences without any spread leave no doubt: p is 1 for equal means, else 0.
+    """
+    one, other = _floats(first), _floats(second)
+    difference = float((one - other).mean())
+    if np.ptp(one - other) == 0:
+        return Comparison(difference, difference, difference, float(difference == 0))
+    test = stats.ttest_rel(one, other)
+    low, high = test.confidence_interval(confidence)
+    return Comparison(difference, float(low), float(high), float(test.pvalue))
+
+
+def mean_and_error(values: ArrayLike) -> tuple[float, float | None]:
+    """The mean of independent values and its standard error; None if there is but one.
+
+    >>> mean_and_error([4.0, 6.0])
+    (5.0, 1.0)
+    """
+    values = _floats(values)
+    error = float(stats.sem(values)) if len(values) > 1 else None
+    return float(values.mean()), error
+
+
 def bootstrap_mean(
     values: ArrayLike, generator: np.random.Generator, confidence: float = CONFIDENCE
 ) -> Interval:
     """The mean with its bias-corrected accelerated bootstrap interval.
 
-    The interval is a point if the values are all equal.
+    The interval is a point if the values are all equal, or if one is unknown (NaN).
     """
     values = _floats(values)
     mean = float(_floats(values).mean())
-    if len(values) < 2 or np.ptp(values) == 0:
+    if len(values) < 2 or not np.ptp(values) > 0:
         return Interval(mean, mean, mean)
     result = stats.bootstrap(
         (values,),
@@ -104,30 +129,6 @@ def mean_curve(curves: ArrayLike, confidence: float = CONFIDENCE) -> Curve:
     error = curves.std(axis=0, ddof=1) / math.sqrt(trials) if trials > 1 else np.zeros_like(mean)
     half = float(stats.t.ppf((1 + confidence) / 2, max(trials - 1, 1))) * error
     return Curve(mean, mean - half, mean + half)
-
-
-def clustered_bootstrap(
-    values: ArrayLike,
-    clusters: ArrayLike,
-    generator: np.random.Generator,
-    confidence: float = CONFIDENCE,
-) -> Interval:
-    """The mean with its percentile interval when whole clusters (source runs) are drawn again."""
-    sums, counts = _per_cluster(values, clusters)
-    draws = generator.integers(len(sums), size=(RESAMPLES, len(sums)))
-    means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
-    return Interval(float(_floats(values).mean()), *_percentiles(means, confidence))
-
-
-def paired_bootstrap(
-    first: ArrayLike,
-    second: ArrayLike,
-    generator: np.random.Generator,
-    confidence: float = CONFIDENCE,
-) -> Interval:
-    """Mean of first - second where entry i of both comes from the same source run i."""
-    differences = np.subtract(first, second)
-    return clustered_bootstrap(differences, np.arange(len(differences)), generator, confidence)
 
 
 def kaplan_meier(times: ArrayLike, reached: ArrayLike) -> SurvivalCurve:
@@ -207,24 +208,16 @@ def trials_needed(effect: float, variation: float, power: float = 0.8, alpha: fl
 def detectable_effect(
     trials: int, variation: float, power: float = 0.8, alpha: float = 0.05
 ) -> float:
-    """The smallest relative difference of means that `trials` an arm see with this power.
+    """The smallest difference of means that `trials` an arm see with this power.
+
+    It is in the unit of `variation`: relative if that is a coefficient of variation, in hours if it
+    is the standard deviation of hours.
 
     >>> round(detectable_effect(trials=100, variation=0.25), 3)
     0.1
     """
     size = TTestIndPower().solve_power(nobs1=trials, power=power, alpha=alpha)
     return float(size) * variation
-
-
-def _per_cluster(values: ArrayLike, clusters: ArrayLike) -> tuple[Floats, Floats]:
-    _, cluster = np.unique(np.asarray(clusters), return_inverse=True)
-    sums = _floats(np.bincount(cluster, weights=_floats(values)))
-    return sums, np.bincount(cluster).astype(np.float64)
-
-
-def _percentiles(values: Floats, confidence: float) -> tuple[float, float]:
-    low, high = np.quantile(values, [(1 - confidence) / 2, (1 + confidence) / 2])
-    return float(low), float(high)
 
 
 def _censored(times: ArrayLike, reached: ArrayLike) -> stats.CensoredData:

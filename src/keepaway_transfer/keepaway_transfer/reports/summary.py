@@ -2,28 +2,38 @@
 
 Times are simulated hours. A trial that did not reach the threshold within the study's limit counts
 with the limit: means of times are means restricted to it, and every row says how many reached it.
+
+Rows are compared trial by trial where the study says that their trials are pairs
+(`Study.are_paired`), by the paired t-test; elsewhere by Welch's. A difference is called none only
+where its interval lies within EQUIVALENT_HOURS on both sides.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from keepaway_transfer import metrics
 from keepaway_transfer.errors import StudyError
-from keepaway_transfer.reports import metrics, statistics
+from keepaway_transfer.reports import statistics
 from keepaway_transfer.reports.kwy import CYCLE_TIME
 from keepaway_transfer.reports.statistics import Comparison, Interval
-from keepaway_transfer.studies.results import Results, Trial
+from keepaway_transfer.studies.records import Record
+from keepaway_transfer.studies.results import Results
 from keepaway_transfer.studies.study import Study
+
+EQUIVALENT_HOURS = 2.0
+"""Differences that lie within this on both sides count as none: what rows of 100 can see."""
+
+SIGNIFICANT = 0.05
 
 
 @dataclass(frozen=True)
 class TrialMeasures:
-    """A line of `trials.csv`: what one trial gave."""
+    """What one trial gave."""
 
     row: str
     trial: int
-    seed: int  # of the study; with row and trial it gives the trial again
     source_episodes: int
     source_hours: float
     reached: bool  # the threshold, within the study's limit
@@ -31,8 +41,7 @@ class TrialMeasures:
     target_hours: float
     total_hours: float  # of source and target
     initial_performance: float  # [s]
-    jumpstart: float  # [s] above the mean initial performance from scratch
-    asymptotic_performance: float  # [s] of the last window of episodes played
+    asymptotic_performance: float  # [s] of the last window; NaN where trials stop at a threshold
     total_reward: float  # [s h] area under the learning curve, to where every trial went
     greedy_performance: float  # [s] without learning and exploring; NaN if not played
     code_version: str
@@ -42,10 +51,13 @@ class TrialMeasures:
 class Against:
     """How a row compares with a reference row: positive differences are hours saved."""
 
-    target: Comparison  # p by Welch's t-test
+    pairs: int  # that the comparisons are of; 0: the rows are independent
+    target: Comparison
     total: Comparison
+    jumpstart: Comparison  # [s] longer than the reference over the first episodes
     target_holm: float  # p-values after Holm's adjustment over the rows
     total_holm: float
+    jumpstart_holm: float
     logrank_holm: float
 
 
@@ -59,7 +71,7 @@ class RowSummary:
     source_hours: float  # mean
     target: Interval  # hours, restricted mean
     total: Interval
-    jumpstart: Interval  # [s]
+    initial: Interval  # [s]
     asymptotic: Interval  # [s]
     greedy: Interval  # [s]
     transfer_ratio: float  # of the mean total rewards, against the first reference
@@ -74,27 +86,29 @@ def measure_trials(results: Results, threshold: float | None = None) -> list[Tri
         threshold: another than the study's [s].
 
     Raises:
-        StudyError: no trials of the reference row; a threshold that trials were not run to.
+        StudyError: no trials of the reference row; a threshold that trials were not run to, or
+            that records without episodes know nothing of.
+    """
+    study, records = results.study, results.records
+    threshold = checked_threshold(results, threshold)
+    if not any(record.row == study.references[0] for record in records):
+        raise StudyError(
+            f"no trial of row {study.references[0]!r} is done yet: nothing to compare with"
+        )
+    horizon = min(metrics.hours(seconds(record.blocks)) for record in records)
+    order = [row.name for row in study.rows]
+    records = tuple(sorted(records, key=lambda one: (order.index(one.row), one.number)))
+    goes_on = goes_on_after_threshold(results)
+    return [_measures(record, study, threshold, horizon, goes_on) for record in records]
+
+
+def goes_on_after_threshold(results: Results) -> bool:
+    """Did all trials run for the same time, whenever they reached the threshold?
+
+    If not, what they hold at their end is the threshold, by construction.
     """
     study = results.study
-    threshold = checked_threshold(study, threshold)
-    scratch = study.references[0]
-    initial = [
-        metrics.initial_performance(seconds(trial.cycles))
-        for trial in results.trials
-        if trial.row == scratch
-    ]
-    if not initial:
-        raise StudyError(f"no trial of row {scratch!r} is done yet: nothing to compare with")
-    start, horizon = float(np.mean(initial)), common_hours(results.trials)
-    order = [row.name for row in study.rows]
-    trials = sorted(results.trials, key=lambda trial: (order.index(trial.row), trial.number))
-    return [_measures(trial, study, threshold, start, horizon) for trial in trials]
-
-
-def common_hours(trials: Sequence[Trial]) -> float:
-    """Simulated hours of the target task that every trial was run for."""
-    return min(metrics.hours(seconds(trial.cycles)) for trial in trials)
+    return study.min_hours >= study.max_hours or not any(one.crossed for one in results.records)
 
 
 def summarise(study: Study, measures: Sequence[TrialMeasures]) -> list[RowSummary]:
@@ -109,11 +123,47 @@ def summarise(study: Study, measures: Sequence[TrialMeasures]) -> list[RowSummar
         for name, comparison in _compare(study, by_row, reference).items():
             against[name][reference] = comparison
     generator = np.random.default_rng(study.seed)
-    scratch = float(np.mean([one.total_reward for one in by_row[study.references[0]]]))
+    scratch = float(np.mean(values(by_row[study.references[0]], "total_reward")))
     return [
         _summary(name, trials, study.max_hours, scratch, against[name], generator)
         for name, trials in by_row.items()
     ]
+
+
+def compare(
+    first: Sequence[TrialMeasures], second: Sequence[TrialMeasures], measure: str, paired: bool
+) -> Comparison:
+    """Mean of a measure in the first trials less that in the second.
+
+    Args:
+        first: trials of one row.
+        second: of another.
+        measure: a name of TrialMeasures.
+        paired: are trials of one number pairs? Those without a partner are left out.
+    """
+    if not paired:
+        return statistics.welch(values(first, measure), values(second, measure))
+    one, other = (
+        {trial.trial: getattr(trial, measure) for trial in row} for row in (first, second)
+    )
+    numbers = sorted(one.keys() & other.keys())
+    return statistics.paired([one[k] for k in numbers], [other[k] for k in numbers])
+
+
+def verdict(comparison: Comparison, p_value: float, margin: float = EQUIVALENT_HOURS) -> str:
+    """What a comparison of hours shows, in a word.
+
+    >>> verdict(Comparison(3.0, 1.0, 5.0, 0.01), 0.02)
+    'saves'
+    >>> verdict(Comparison(-0.1, -1.5, 1.3, 0.9), 0.9)
+    'none: within 1.5 h'
+    >>> verdict(Comparison(1.1, -0.5, 2.7, 0.2), 0.4)
+    'open'
+    """
+    if p_value < SIGNIFICANT:
+        return "saves" if comparison.difference > 0 else "costs"
+    furthest = max(abs(comparison.low), abs(comparison.high))
+    return f"none: within {furthest:.1f} h" if furthest <= margin else "open"
 
 
 def seconds(cycles: Sequence[int]) -> metrics.Floats:
@@ -121,43 +171,67 @@ def seconds(cycles: Sequence[int]) -> metrics.Floats:
     return np.asarray(cycles, dtype=np.float64) * CYCLE_TIME
 
 
-def checked_threshold(study: Study, threshold: float | None) -> float:
+def checked_threshold(results: Results, threshold: float | None) -> float:
     """The threshold to use [s]: the study's, or another one that its trials were run to."""
-    if threshold is None:
+    study = results.study
+    if threshold is None or threshold == study.threshold:
         return study.threshold
     if threshold > study.threshold and study.min_hours < study.max_hours:
         raise StudyError(
             f"threshold={threshold:g}: the trials stopped at {study.threshold:g} s, give less"
         )
+    if not all(record.has_episodes for record in results.records):
+        raise StudyError(
+            f"threshold={threshold:g}: of these trials only the times to {study.threshold:g} s are"
+            " known"
+        )
     return threshold
 
 
+def crossing_of(record: Record, study: Study, threshold: float) -> metrics.TimeToThreshold:
+    """When a trial passed a threshold [s]: exactly for the study's, else to the end of a block."""
+    if threshold == study.threshold:
+        return metrics.TimeToThreshold(
+            record.crossed, record.crossing_episodes, record.crossing_hours
+        )
+    means = seconds(record.blocks) / record.block
+    found = metrics.time_to_threshold(means, threshold, study.window // record.block)
+    if not found.reached:
+        return metrics.TimeToThreshold(False, record.episodes, record.hours)
+    return found._replace(episodes=found.episodes * record.block, hours=found.hours * record.block)
+
+
+def values(trials: Sequence[TrialMeasures], measure: str) -> list[float]:
+    """One measure of many trials."""
+    return [getattr(one, measure) for one in trials]
+
+
 def _measures(
-    trial: Trial, study: Study, threshold: float, scratch_start: float, horizon: float
+    record: Record, study: Study, threshold: float, horizon: float, goes_on: bool
 ) -> TrialMeasures:
-    durations = seconds(trial.cycles)
-    crossing = metrics.time_to_threshold(durations, threshold, study.window)
+    crossing = crossing_of(record, study, threshold)
     target_hours = min(crossing.hours, study.max_hours)
-    source_hours = sum(run.cycles for run in trial.sources) * CYCLE_TIME / metrics.SECONDS_PER_HOUR
-    initial = metrics.initial_performance(durations)
-    greedy = seconds(trial.greedy_cycles)
     return TrialMeasures(
-        row=trial.row,
-        trial=trial.number,
-        seed=study.seed,
-        source_episodes=sum(run.episodes for run in trial.sources),
-        source_hours=source_hours,
+        row=record.row,
+        trial=record.number,
+        source_episodes=record.source_episodes,
+        source_hours=record.source_hours,
         reached=crossing.reached and crossing.hours <= study.max_hours,
         target_episodes=crossing.episodes,
         target_hours=target_hours,
-        total_hours=source_hours + target_hours,
-        initial_performance=initial,
-        jumpstart=initial - scratch_start,
-        asymptotic_performance=metrics.asymptotic_performance(durations, study.window),
-        total_reward=metrics.total_reward(durations, horizon, study.window),
-        greedy_performance=float(greedy.mean()) if greedy.size else float("nan"),
-        code_version=trial.code_version,
+        total_hours=record.source_hours + target_hours,
+        initial_performance=record.initial,
+        asymptotic_performance=record.final if goes_on else float("nan"),
+        total_reward=_total_reward(record, horizon, study.window),
+        greedy_performance=record.greedy,
+        code_version=record.code_version,
     )
+
+
+def _total_reward(record: Record, horizon: float, window: int) -> float:
+    if not record.has_episodes:
+        return float("nan")
+    return metrics.total_reward(seconds(record.blocks), horizon, window, block=record.block)
 
 
 def _compare(
@@ -168,41 +242,40 @@ def _compare(
     names = [name for name, trials in by_row.items() if name != reference and len(trials) > 1]
     if len(base) < 2 or not names:
         return {}
-    target = [_difference(study, base, by_row[name], "target_hours") for name in names]
-    total = [_difference(study, base, by_row[name], "total_hours") for name in names]
-    logrank = [_logrank(base, by_row[name]) for name in names]
-    adjusted = zip(
-        statistics.holm([comparison.p_value for comparison in target]),
-        statistics.holm([comparison.p_value for comparison in total]),
-        statistics.holm(logrank),
-        strict=True,
+    pairs = {name: _pairs(study, reference, base, name, by_row[name]) for name in names}
+
+    def of_all(compared: Callable[[str], Comparison]) -> tuple[list[Comparison], list[float]]:
+        found = [compared(name) for name in names]
+        return found, statistics.holm([one.p_value for one in found]).tolist()
+
+    def saved(measure: str) -> tuple[list[Comparison], list[float]]:
+        return of_all(lambda name: compare(base, by_row[name], measure, pairs[name] > 0))
+
+    target, target_holm = saved("target_hours")
+    total, total_holm = saved("total_hours")
+    jumpstart, jumpstart_holm = of_all(
+        lambda name: compare(by_row[name], base, "initial_performance", pairs[name] > 0)
     )
+    logrank = statistics.holm([_logrank(base, by_row[name]) for name in names]).tolist()
+    rest = target, total, jumpstart, target_holm, total_holm, jumpstart_holm, logrank
     return {
-        name: Against(of_target, of_total, *(float(p) for p in p_values))
-        for name, of_target, of_total, p_values in zip(names, target, total, adjusted, strict=True)
+        name: Against(pairs[name], *entries) for name, *entries in zip(names, *rest, strict=True)
     }
 
 
-def _difference(
-    study: Study, base: list[TrialMeasures], other: list[TrialMeasures], measure: str
-) -> Comparison:
-    """Hours saved; where both rows share their source runs the interval is of the pairs."""
-    welch = statistics.welch(values(base, measure), values(other, measure))
-    pairs = _pairs(base, other) if study.shared_sources else []
-    if len(pairs) < 2:
-        return welch
-    first, second = np.array([[getattr(one, measure) for one in pair] for pair in pairs]).T
-    generator = np.random.default_rng(study.seed)
-    _, low, high = statistics.paired_bootstrap(first, second, generator)
-    return welch._replace(low=low, high=high)
-
-
 def _pairs(
-    base: list[TrialMeasures], other: list[TrialMeasures]
-) -> list[tuple[TrialMeasures, TrialMeasures]]:
-    """Trials of two rows that began with the same source run."""
-    by_number = {one.trial: one for one in base if one.source_episodes}
-    return [(by_number[one.trial], one) for one in other if one.trial in by_number]
+    study: Study,
+    reference: str,
+    base: Sequence[TrialMeasures],
+    name: str,
+    trials: Sequence[TrialMeasures],
+) -> int:
+    """How many pairs two rows have; 0 if their trials are none, or if there is but one."""
+    rows = {row.name: row for row in study.rows}
+    if not study.are_paired(rows[reference], rows[name]):
+        return 0
+    both = {one.trial for one in base} & {one.trial for one in trials}
+    return len(both) if len(both) > 1 else 0
 
 
 def _logrank(base: list[TrialMeasures], other: list[TrialMeasures]) -> float:
@@ -234,14 +307,9 @@ def _summary(
         source_hours=float(np.mean(values(trials, "source_hours"))),
         target=statistics.restricted_mean(values(trials, "target_hours"), reached, limit),
         total=mean("total_hours"),
-        jumpstart=mean("jumpstart"),
+        initial=mean("initial_performance"),
         asymptotic=mean("asymptotic_performance"),
         greedy=mean("greedy_performance"),
         transfer_ratio=metrics.transfer_ratio(rewards, scratch_reward),
         against=against,
     )
-
-
-def values(trials: Sequence[TrialMeasures], measure: str) -> list[float]:
-    """One measure of many trials."""
-    return [getattr(one, measure) for one in trials]

@@ -24,12 +24,12 @@ from keepaway_agent.training.trial import StopRule, TrainerConfig, TrialResult
 from keepaway_agent.training.trial import Trial as Run
 from keepaway_sim.version import code_version
 from keepaway_sim.world.config import CYCLE_TIME
-from keepaway_transfer.reports.metrics import SECONDS_PER_HOUR
+from keepaway_transfer.metrics import SECONDS_PER_HOUR
 from keepaway_transfer.rho import Transfer, rho
 from keepaway_transfer.studies.experiment import Key
 from keepaway_transfer.studies.results import SourceRun, Trial
 from keepaway_transfer.studies.study import Row, Study
-from keepaway_transfer.variants import variant_of
+from keepaway_transfer.variants import constant, variant_of
 
 CYCLES_PER_HOUR = SECONDS_PER_HOUR / CYCLE_TIME
 GREEDY, CHOICE, SHUFFLE, TARGET = 100, 101, 102, 103  # seeds of what is no source stage
@@ -74,9 +74,9 @@ def _constant(study: Study, row: Row) -> np.ndarray | None:
     """What a row that learns from no source starts with; None from scratch."""
     if row.stages or row.is_scratch:
         return None
-    config = _config(study, study.target, row.widths)
-    nothing = np.zeros(config.tiling(Role.KEEPER).weights_shape(config.task.num_keepers))
-    return variant_of(row.variant).changed(nothing, 1.0)
+    config, level = _config(study, study.target, row.widths), variant_of(row.variant).level
+    shape = config.tiling(Role.KEEPER).weights_shape(config.task.num_keepers)
+    return None if level is None else constant(level, shape)
 
 
 def _train_sources(study: Study, lives: Sequence[_Life], stage: int) -> None:

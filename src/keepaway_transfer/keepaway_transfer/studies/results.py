@@ -1,14 +1,15 @@
 """The results of a study on disk: a folder that trials are appended to, one by one.
 
 `study.json` holds the settings, the code version and the command; `trials.jsonl` one JSON object a
-line and trial. A line is on the disk before the next trial is waited for, so that a run can be
-killed at any moment; half a line is cut off when the folder is opened to go on. A folder takes
-trials of one study only, from one process at a time. Trials may be packed (gzip trials.jsonl);
-those that are added later lie beside them.
+line and trial, with every episode's duration. A line is on the disk before the next trial is waited
+for, so that a run can be killed at any moment; half a line is cut off when the folder is opened to
+go on. A folder takes trials of one study only, from one process at a time.
+
+`pack` makes `trials.parquet` of it (`records`): a hundredth of the size, and all that reports need.
+A folder with that file is whole without the other, and a study can go on in it.
 """
 
 import fcntl
-import gzip
 import json
 import logging
 import os
@@ -19,7 +20,16 @@ from pathlib import Path
 from typing import IO, Any
 
 from keepaway_agent.files import write_whole
+from keepaway_sim.world.config import CYCLE_TIME
+from keepaway_transfer import metrics
 from keepaway_transfer.errors import StudyError
+from keepaway_transfer.studies.records import (
+    RECORDS_FILE,
+    Record,
+    durations_record,
+    read_records,
+    write_records,
+)
 from keepaway_transfer.studies.study import Study, study_from
 
 log = logging.getLogger(__name__)
@@ -56,28 +66,81 @@ class Trial:
 
 @dataclass(frozen=True)
 class Results:
-    """A results folder that was read: the study and its trials so far."""
+    """A results folder that was read: the study and the records of its trials so far."""
 
     study: Study
     command: str
     code_version: str  # that the folder was begun with
-    trials: tuple[Trial, ...]
+    records: tuple[Record, ...]
+    note: str = ""  # what else must be known of them
+
+
+def record_of(trial: Trial, study: Study) -> Record:
+    """What is kept of a trial of this study."""
+    cycles = sum(run.cycles for run in trial.sources)
+    return Record(
+        row=trial.row,
+        number=trial.number,
+        source_episodes=sum(run.episodes for run in trial.sources),
+        source_hours=cycles * CYCLE_TIME / metrics.SECONDS_PER_HOUR,
+        code_version=trial.code_version,
+        **durations_record(trial.cycles, trial.greedy_cycles, study.threshold, study.window),
+    )
 
 
 def read_results(folder: Path | str) -> Results:
-    """Read a results folder, also one whose trials were packed into `trials.jsonl.gz`.
+    """Read a results folder, packed or not.
 
     Raises:
         StudyError: no results there, or a line that is no trial, with its number.
     """
-    head = _read_head(Path(folder))
+    folder = Path(folder)
+    head = _read_head(folder)
     try:
-        trials = tuple(_read_trials(Path(folder)))
-        return Results(study_from(head["study"]), head["command"], head["code_version"], trials)
-    except StudyError:
-        raise
+        study = study_from(head["study"])
+        about = head["command"], head["code_version"]
+    except StudyError as error:
+        raise StudyError(f"{folder / STUDY_FILE}: {error}") from error
     except (KeyError, ValueError) as error:
         raise StudyError(f"{folder} holds no results: {error!r}") from error
+    packed = _read_packed(folder)
+    known = {record.key for record in packed}
+    fresh = tuple(record_of(one, study) for one in read_trials(folder) if one.key not in known)
+    return Results(study, *about, (*packed, *fresh), str(head.get("note", "")))
+
+
+def read_trials(folder: Path | str) -> Iterator[Trial]:
+    """The trials of `trials.jsonl`, each once with all its episodes; none if it is not there.
+
+    Raises:
+        StudyError: a line that is no trial, with its number.
+    """
+    path = Path(folder) / TRIALS_FILE
+    if not path.exists():
+        return
+    seen: set[tuple[str, int]] = set()
+    with path.open(encoding="utf-8") as lines:
+        for number, line in enumerate(lines, start=1):
+            if not line.endswith("\n"):  # it is still being written
+                continue
+            trial = _trial_from(line, f"{path}, trial on line {number}")
+            if trial.key not in seen:
+                seen.add(trial.key)
+                yield trial
+
+
+def pack(folder: Path | str, into: Path | str | None = None) -> Path:
+    """Write the records of a folder's trials as `trials.parquet`, there or into another folder.
+
+    Another folder gets `study.json` as well: it is then results like any other.
+    """
+    folder, into = Path(folder), Path(into or folder)
+    records = read_results(folder).records
+    into.mkdir(parents=True, exist_ok=True)
+    if into.resolve() != folder.resolve():
+        write_whole(into / STUDY_FILE, (folder / STUDY_FILE).read_text(encoding="utf-8"))
+    write_records(into / RECORDS_FILE, records)
+    return into / RECORDS_FILE
 
 
 class ResultsFolder:
@@ -131,7 +194,8 @@ def open_results(
             head = {"study": settings, "command": command, "code_version": code_version}
             write_whole(folder / STUDY_FILE, json.dumps(head, indent=1, allow_nan=False) + "\n")
         _cut_off_half_a_line(file)
-        yield ResultsFolder(file, frozenset(trial.key for trial in _read_trials(folder)))
+        done = {record.key for record in _read_packed(folder)}
+        yield ResultsFolder(file, frozenset(done.union(one.key for one in read_trials(folder))))
 
 
 def _check_same(folder: Path, study: Study, code_version: str, any_code: bool) -> None:
@@ -164,21 +228,9 @@ def _read_head(folder: Path) -> dict[str, Any]:
     return head
 
 
-def _read_trials(folder: Path) -> Iterator[Trial]:
-    """Every trial once: first the packed ones, then those that were added since."""
-    seen: set[tuple[str, int]] = set()
-    for name, opened in ((f"{TRIALS_FILE}.gz", gzip.open), (TRIALS_FILE, open)):
-        path = folder / name
-        if not path.exists():
-            continue
-        with opened(path, "rt", encoding="utf-8") as lines:
-            for number, line in enumerate(lines, start=1):
-                if not line.endswith("\n"):  # it is still being written
-                    continue
-                trial = _trial_from(line, f"{path}, trial on line {number}")
-                if trial.key not in seen:
-                    seen.add(trial.key)
-                    yield trial
+def _read_packed(folder: Path) -> tuple[Record, ...]:
+    path = folder / RECORDS_FILE
+    return read_records(path) if path.exists() else ()
 
 
 def _trial_from(line: str, where: str) -> Trial:

@@ -69,35 +69,40 @@ def asymptotic_performance(durations: ArrayLike, window: int = WINDOW) -> float:
 
 
 def learning_curve(
-    durations: ArrayLike, at_hours: ArrayLike, window: int = WINDOW, least: int = 1
+    durations: ArrayLike,
+    at_hours: ArrayLike,
+    window: int = WINDOW,
+    least: int = 1,
+    block: int = 1,
 ) -> Floats:
     """Mean duration [s] of the last `window` episodes that ended by each of `at_hours`.
 
     At the start it is over fewer episodes, but `least`; NaN where fewer ended and after the trial
-    stopped.
+    stopped. Durations may be sums of `block` successive episodes each; the mean is then over the
+    blocks that ended.
     """
     durations = np.asarray(durations, dtype=np.float64)
     sums = np.concatenate([[0.0], np.cumsum(durations)])
     at_seconds = np.asarray(at_hours, dtype=np.float64) * SECONDS_PER_HOUR
     finished = np.searchsorted(sums[1:], at_seconds, side="right")
-    averaged = np.minimum(finished, window)
-    known = (finished >= least) & (at_seconds <= sums[-1])
+    averaged = np.minimum(finished, window // block)
+    known = (finished * block >= least) & (finished > 0) & (at_seconds <= sums[-1])
     totals = sums[finished] - sums[finished - averaged]
-    return np.where(known, totals / np.maximum(averaged, 1), np.nan)
+    return np.where(known, totals / np.maximum(averaged * block, 1), np.nan)
 
 
 def total_reward(
-    durations: ArrayLike, horizon: float, window: int = WINDOW, points: int = 200
+    durations: ArrayLike, horizon: float, window: int = WINDOW, points: int = 200, block: int = 1
 ) -> float:
     """Area under the learning curve from 0 to `horizon` hours [s h]; NaN if the trial ran for less.
 
-    The curve is read at the middle of `points` equal spans; before the first episode ended it is
-    taken to be that episode's duration.
+    The curve is read at the middle of `points` equal spans; before the first episode (or block of
+    episodes) ended it is taken to be that one's mean duration.
     """
     middles = (np.arange(points) + 0.5) * horizon / points
-    curve = learning_curve(durations, middles, window)
+    curve = learning_curve(durations, middles, window, block=block)
     first = float(np.asarray(durations, dtype=np.float64)[0])
-    curve[middles * SECONDS_PER_HOUR < first] = first
+    curve[middles * SECONDS_PER_HOUR < first] = first / block
     return float(np.mean(curve)) * horizon
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keepaway_transfer.reports import metrics
+from keepaway_transfer import metrics
 
 HALF_HOUR = 1800.0  # [s]
 
