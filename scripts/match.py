@@ -30,17 +30,24 @@ from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.player import Player
 from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
-from keepaway_sim.cli.options import ros_arguments
+from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
+from keepaway_sim.world.config import Config
 
 SCRIPTS = Path(__file__).resolve().parent
 START_TIMEOUT = 300.0  # [s] for everybody to come; so much because a first start compiles
 END_TIMEOUT = 15.0  # [s] for everybody to save and end
+MATCH_OPTIONS = (
+    *("task", "field", "seed", "speed", "episodes", "answer_timeout"),
+    *("record", "wait_for_recorder"),
+)
+WORLD_OPTIONS = ("profile", "visible_angle_deg")
 MOST_UNHEARD = 1000  # messages that may still wait to be taken in at the end
 
 
@@ -110,9 +117,7 @@ def seat_agents(args: argparse.Namespace, task: Task) -> None:
 
 def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
-    own = {"task", "field", "seed", "speed", "episodes", "answer_timeout"}
-    own |= {"profile", "visible_angle", "record", "wait_for_recorder"}
-    settings = {name: value for name, value in vars(args).items() if name in own}
+    settings = {name: vars(args)[name] for name in MATCH_OPTIONS + WORLD_OPTIONS}
     players = {
         name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
     }
@@ -299,24 +304,10 @@ def parse() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--task", default="3v2", help="keepers v takers (default 3v2)")
-    add("--episodes", type=int, default=0, help="to play; 0 (default): until Ctrl-C")
+    add_options(parser, MatchSettings, only=MATCH_OPTIONS, with_defaults=True)
+    add_options(parser, Config, only=WORLD_OPTIONS, with_defaults=True)
     add("--keeper-policy", choices=list(KEEPER_POLICIES), default="hand")
     add("--taker-policy", choices=list(TAKER_POLICIES), default="hand")
-    add("--seed", type=int, default=0, help="every random number follows from it (default 0)")
-    add("--speed", type=float, default=0.0, help="1 is real time; 0 (default): lock-step")
-    add(
-        "--answer-timeout", type=float, default=2.0, help="[s] who is slower is missing (default 2)"
-    )
-    add("--field", default="25x25", help="length x width in metres (default 25x25)")
-    add("--visible-angle", type=float, default=360.0, help="of players [deg] (default 360)")
-    add("--profile", default="2005", help="of the world's constants: 2005 (default) or v19")
-    add("--record", default="", metavar="DIR", help="write a bag of everything that is said")
-    add(
-        "--wait-for-recorder",
-        action="store_true",
-        help="begin with a recorder (scripts/record.py), play no faster than it follows",
-    )
     add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
     add("--save-every", type=int, default=100, help="and how often, in episodes (default 100)")
     add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")

@@ -12,7 +12,7 @@ import argparse
 import sys
 
 from keepaway_sim.cli.options import add_options, parse_node_arguments
-from keepaway_sim.nodes.recorder import Settings, main
+from keepaway_sim.nodes.recorder import RecorderSettings, main
 
 
 def parser() -> argparse.ArgumentParser:
@@ -21,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument("path", metavar="BAG", help="folder to make")
-    add_options(made, Settings, without=("path",))
+    add_options(made, RecorderSettings, without=("path",))
     return made
 
 

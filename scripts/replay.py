@@ -34,7 +34,7 @@ from keepaway_sim.bags.playback import Playback
 from keepaway_sim.bags.verify import check_world
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.nodes.replayer import Replayer, Settings, stoppable
+from keepaway_sim.nodes.replayer import Replayer, ReplayerSettings, stoppable
 from keepaway_sim.wire.messages import SECOND
 
 
@@ -122,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--check", action="store_true", default=argparse.SUPPRESS, help="that it replays, no ROS"
     )
-    add_options(made, Settings, without=("path",))
+    add_options(made, ReplayerSettings, without=("path",))
     return made
 
 

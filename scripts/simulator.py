@@ -1,7 +1,7 @@
 """Start the simulator's node: it says what is played and waits for the players.
 
     .venv/bin/python scripts/simulator.py --task 3v2 --seed 7 --speed 1
-    .venv/bin/python scripts/simulator.py --visible-angle 90 --ros-args -r __ns:=/match_2
+    .venv/bin/python scripts/simulator.py --visible-angle-deg 90 --ros-args -r __ns:=/match_2
 
 Every parameter of the node is an option, the world's constants among them; what follows --ros-args
 goes to the node as it is.
@@ -13,7 +13,7 @@ import sys
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.nodes.simulator import main
-from keepaway_sim.world.config import Physics, Skills, Vision
+from keepaway_sim.world.config import Config
 
 
 def parser() -> argparse.ArgumentParser:
@@ -21,8 +21,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    made.add_argument("--profile", default=argparse.SUPPRESS, help="2005 (default) or v19")
-    for group in (MatchSettings, Physics, Vision, Skills):
+    for group in (MatchSettings, Config):
         add_options(made, group)
     return made
 

@@ -9,9 +9,8 @@ name is the player's: the match of a task has taker_1, taker_2 and so on.
 import argparse
 import sys
 
-from keepaway_agent.nodes.player import Files
 from keepaway_agent.nodes.taker import main
-from keepaway_agent.playing.agent import AgentConfig
+from keepaway_agent.playing.agent import AgentConfig, WeightsFiles
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 
 
@@ -21,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument("--name", default="", help="of the player (default taker_1)")
-    for group in (AgentConfig, Files):
+    for group in (AgentConfig, WeightsFiles):
         add_options(made, group)
     return made
 

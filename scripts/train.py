@@ -14,7 +14,6 @@ like a match's, of the first trial.
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import logging
 import math
@@ -36,7 +35,7 @@ from keepaway_agent.training.trial import Progress
 from keepaway_agent.training.trial_recorder import TrialRecorder
 from keepaway_agent.training.workers import NUM_FIELDS, play
 from keepaway_sim.cli.interrupts import Interruption, Stopped
-from keepaway_sim.cli.options import add_options, numbers_in
+from keepaway_sim.cli.options import add_options, chosen, numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.scores import Score, summary
 from keepaway_sim.task import Outcome
@@ -69,10 +68,8 @@ class TqdmHandler(logging.Handler):
 
 def run(arguments: argparse.Namespace, interruption: Interruption) -> int:
     """Train what is missing; the exit code."""
-    names = {entry.name for entry in dataclasses.fields(Training)}
     try:
-        chosen = {name: value for name, value in vars(arguments).items() if name in names}
-        training = Training(**chosen)
+        training = chosen(Training, arguments)
         command = shlex.join(["scripts/train.py", *sys.argv[1:]])
         folder = (
             TrainingFolder(arguments.save_weights, training, command, arguments.any_code)
@@ -114,8 +111,8 @@ def recorder_of(
             f"--record {arguments.record}: trial {RECORDED_TRIAL} is in {arguments.save_weights}"
             " already and is not played again; name another folder for the weights"
         )
-    chosen = numbers_in(arguments.record_episodes) if arguments.record_episodes else None
-    return training.recorder(arguments.record, chosen, command)
+    wanted = numbers_in(arguments.record_episodes) if arguments.record_episodes else None
+    return training.recorder(arguments.record, wanted, command)
 
 
 def train(

@@ -9,6 +9,7 @@ import numpy as np
 
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
+from keepaway_agent.settings import build
 from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.task import Action, Outcome, Task
@@ -43,12 +44,12 @@ def record_agents(
         agents: player's name -> fields of AgentConfig.
         seed, episodes, task: of the match.
     """
-    world = World(Task.parse(task), profile(visible_angle=90.0))
+    world = World(Task.parse(task), profile(visible_angle_deg=90.0))
     world.start(0, np.random.SeedSequence(seed, spawn_key=(0, 0)))
     teams = world.task.num_keepers, world.task.num_takers
     facts = MatchFacts(*teams, world.task.field_length, world.task.field_width, CYCLE_TIME, seed)
     players = [
-        Agent(facts, index, AgentConfig(**agents.get(name, {})))
+        Agent(facts, index, build(AgentConfig, agents.get(name, {})))
         for index, name in enumerate(world.task.player_names)
     ]
     with BagWriter(path, world_info(world, seed, agents=json.dumps(agents))) as bag:

@@ -21,7 +21,6 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,6 +40,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.beginning import begin_match
 from keepaway_sim.match.roster import Roster, checked_status
 from keepaway_sim.match.settings import MatchSettings
+from keepaway_sim.settings import build, flat
 from keepaway_sim.task import Task
 from keepaway_sim.view.live import LiveMatch
 from keepaway_sim.wire import messages
@@ -370,15 +370,14 @@ def live_page() -> Callable[[bytes], object]:
 
 
 def plain(parameters: Any) -> bytes:
-    """A dataclass as JSON."""
-    return json.dumps(asdict(parameters)).encode()
+    """Settings as JSON."""
+    return json.dumps(flat(parameters)).encode()
 
 
 def world_parameters() -> list[bytes]:
     """Every constant of the world by name, as JSON."""
-    config = Config()
-    groups = (config.physics, config.vision, config.skills)
-    return [json.dumps({n: v for g in groups for n, v in asdict(g).items()}).encode()]
+    constants = {name: value for name, value in flat(Config()).items() if name != "profile"}
+    return [json.dumps(constants).encode()]
 
 
 def parameters_of(data: bytes, known: set[str]) -> dict[str, Any]:
@@ -398,14 +397,14 @@ def parameters_of(data: bytes, known: set[str]) -> dict[str, Any]:
 def of_their_types(given: dict[str, Any], defaults: Any) -> dict[str, Any]:
     """Those whose type is their default's: ROS itself refuses others."""
     return {
-        name: value for name, value in given.items() if type(value) is type(getattr(defaults, name))
+        name: value for name, value in given.items() if type(value) is type(flat(defaults)[name])
     }
 
 
 def make_settings(data: bytes) -> object:
     """A simulator's settings."""
     default = MatchSettings()
-    return MatchSettings(**of_their_types(parameters_of(data, set(asdict(default))), default))
+    return MatchSettings(**of_their_types(parameters_of(data, set(flat(default))), default))
 
 
 def make_world(data: bytes) -> object:
@@ -425,10 +424,10 @@ def make_agent(data: bytes) -> object:
     """A player's settings."""
     default = AgentConfig()
     try:
-        given = of_their_types(parameters_of(data, set(asdict(default))), default)
+        given = of_their_types(parameters_of(data, set(flat(default))), default)
     except KeepawayError as error:
         raise AgentError(str(error)) from error
-    config = AgentConfig(**given)
+    config = build(AgentConfig, given)
     check_config(Role.KEEPER, config)
     return config
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from keepaway_agent.actions import Role
 from keepaway_agent.learning.cmac import Tiling, action_values, make_tiling, state_cells
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import SarsaConfig
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_sim.task import Task
 from keepaway_transfer.errors import MappingError

@@ -7,3 +7,7 @@ class AgentError(ValueError):
 
 class WeightsError(AgentError):
     """Weights, or a file of weights, that cannot be used here."""
+
+
+class SettingError(AgentError):
+    """A setting that does not exist, or whose value is refused."""

@@ -3,3 +3,7 @@
 
 class KeepawayError(ValueError):
     """Bad input, refused at the edge; the message names the value and the way out."""
+
+
+class SettingError(KeepawayError):
+    """A setting that does not exist, or whose value is refused."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import re
-from dataclasses import dataclass
 from enum import IntEnum
 
+import attrs
+
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.settings import setting
 
 MAX_TEAM_SIZE = 11  # a soccer team; the soccer server knows no larger one
 MIN_FIELD_SIDE = 10.0  # [m] below this the kick-off corners (3 m) and the ball's place overlap
 MAX_FIELD_SIDE = 100.0  # [m] about the soccer server's pitch; beyond it players see nobody
+FIELD_SIDES = f"[{MIN_FIELD_SIDE:g}, {MAX_FIELD_SIDE:g}]"
 
 
 class Action(IntEnum):
@@ -40,7 +42,7 @@ class Role(IntEnum):
     TAKER = 1
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class Task:
     """Keepaway of `num_keepers` against `num_takers` on a rectangular field.
 
@@ -51,27 +53,12 @@ class Task:
         KeepawayError: a team or a field on which keepaway makes no sense.
     """
 
-    num_keepers: int = 3
-    num_takers: int = 2
-    field_length: float = 25.0  # [m] along x
-    field_width: float = 25.0  # [m] along y
-
-    def __post_init__(self) -> None:
-        if not 2 <= self.num_keepers <= MAX_TEAM_SIZE:
-            raise KeepawayError(
-                f"num_keepers={self.num_keepers}: keepaway needs 2 to {MAX_TEAM_SIZE} keepers"
-                " (one alone has nobody to pass to)"
-            )
-        if not 1 <= self.num_takers <= MAX_TEAM_SIZE:
-            raise KeepawayError(
-                f"num_takers={self.num_takers}: keepaway needs 1 to {MAX_TEAM_SIZE} takers"
-            )
-        for name in ("field_length", "field_width"):
-            side = getattr(self, name)
-            if not (math.isfinite(side) and MIN_FIELD_SIDE <= side <= MAX_FIELD_SIDE):
-                raise KeepawayError(
-                    f"{name}={side}: give a side of {MIN_FIELD_SIDE:g} to {MAX_FIELD_SIDE:g} m"
-                )
+    num_keepers: int = setting(
+        3, "keepers; one alone has nobody to pass to", "players", f"[2, {MAX_TEAM_SIZE}]"
+    )
+    num_takers: int = setting(2, "takers", "players", f"[1, {MAX_TEAM_SIZE}]")
+    field_length: float = setting(25.0, "side of the field along x", "m", FIELD_SIDES)
+    field_width: float = setting(25.0, "side of the field along y", "m", FIELD_SIDES)
 
     @classmethod
     def parse(cls, name: str, field: str = "25x25") -> Task:

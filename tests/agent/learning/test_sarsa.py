@@ -10,7 +10,8 @@ from keepaway_agent.compiled import compiled
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import Tiling, make_tiling
-from keepaway_agent.learning.sarsa import NO_ACTION, SarsaConfig, make_learners, tiles_of
+from keepaway_agent.learning.config import SarsaConfig
+from keepaway_agent.learning.sarsa import NO_ACTION, make_learners, tiles_of
 
 X = Tiling(("x",), (2.0,), (0.0,), (10.0,))  # one variable; a fine cell is 1/16 wide
 GREEDY_FIRST = np.array([0.9, 0.5, 0.0])  # no exploring; the first of equal actions

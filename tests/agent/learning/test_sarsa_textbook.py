@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import NUM_TILINGS, Tiling
-from keepaway_agent.learning.sarsa import SarsaConfig, make_learners, tiles_of
+from keepaway_agent.learning.config import SarsaConfig
+from keepaway_agent.learning.sarsa import make_learners, tiles_of
 
 PLANE = Tiling(("x", "y"), (2.0, 0.5), (0.0, 0.0), (10.0, 3.0))
 

@@ -25,7 +25,7 @@ from keepaway_agent.actions import Role
 from keepaway_agent.errors import WeightsError
 from keepaway_agent.learning import weights as weights_module
 from keepaway_agent.learning.cmac import make_tiling
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import SarsaConfig
 from keepaway_agent.learning.weights import (
     LearnedWeights,
     check_fits,

@@ -7,6 +7,7 @@ from keepaway_agent.actions import Action, Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived, check_config
 from keepaway_agent.playing.policies import View
+from keepaway_agent.settings import build
 
 FACTS = MatchFacts(3, 2, 25.0, 25.0, cycle_time=0.1, seed=5)
 POSITIONS = np.array([[0, 0], [10, 0], [0, 10], [-4, 0], [0, -6], [0.5, 0]], dtype=float)
@@ -156,7 +157,7 @@ def test_weights_of_another_task_are_refused():
 )
 def test_settings_that_make_no_player_are_refused(role, settings, why):
     with pytest.raises(AgentError, match=why):
-        check_config(role, AgentConfig(**settings))
+        check_config(role, build(AgentConfig, settings))
 
 
 def test_there_is_no_sixth_player_among_five():

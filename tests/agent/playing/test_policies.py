@@ -9,7 +9,8 @@ from keepaway_agent.actions import NO_TARGET, UNREACHABLE, Action, Outcome, Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
-from keepaway_agent.learning.sarsa import NO_ACTION, SarsaConfig, make_learners
+from keepaway_agent.learning.config import SarsaConfig
+from keepaway_agent.learning.sarsa import NO_ACTION, make_learners
 from keepaway_agent.playing import policies
 from keepaway_agent.playing.policies import View, keeper_decision, make_player, taker_decision
 

@@ -8,7 +8,8 @@ import pytest
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError
-from keepaway_agent.learning.sarsa import SarsaConfig, tiles_of
+from keepaway_agent.learning.config import LearnerConfig
+from keepaway_agent.learning.sarsa import tiles_of
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
 from keepaway_agent.training.trainer import Trainer
@@ -17,8 +18,8 @@ from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.world import World
 
-SARSA = SarsaConfig(lambda_=0.3, epsilon=0.05)
-CONFIG = TrainerConfig(sarsa=SARSA)
+LEARNER = LearnerConfig(lambda_=0.3, epsilon=0.05)
+CONFIG = TrainerConfig(learner=LEARNER)
 
 
 def make_trial(number: int = 0, episodes: int = 6, **changes: Any) -> Trial:
@@ -45,7 +46,7 @@ def assert_same(one: TrialResult, other: TrialResult) -> None:
 
 @pytest.mark.parametrize("task", ["3v2", "4v3"])
 def test_a_trial_is_bit_identical_alone_and_among_others(task):
-    config = TrainerConfig(task=Task.parse(task), sarsa=SARSA)
+    config = TrainerConfig(task=Task.parse(task), learner=LEARNER)
     trials = [
         make_trial(number, episodes=2 + number % 5, taker_policy=("hand", "learn")[number % 2])
         for number in range(9)
@@ -63,15 +64,14 @@ def test_every_trial_has_its_own_luck():
     assert len(set(durations)) == 3
 
 
-def play_one_by_one(seed, policy, num_episodes, sarsa=SARSA):
+def play_one_by_one(seed, policy, num_episodes, learner=LEARNER):
     """The same match with each player asked by itself, as ROS nodes are."""
     task = Task()
     facts = MatchFacts(
         num_keepers=3, num_takers=2, field_length=25.0, field_width=25.0, cycle_time=0.1, seed=seed
     )
-    settings = {"lambda_": sarsa.lambda_, "epsilon": sarsa.epsilon}
     agents = [
-        Agent(facts, p, AgentConfig(policy=policy if p < task.num_keepers else "hand", **settings))
+        Agent(facts, p, AgentConfig(policy if p < task.num_keepers else "hand", learner))
         for p in range(task.num_players)
     ]
     world = World(task, Config())
@@ -180,7 +180,7 @@ def test_a_trial_starts_from_the_weights_it_is_given():
 
 
 def test_keepers_that_share_end_with_the_same_weights():
-    shared = TrainerConfig(sarsa=SARSA, shared=True)
+    shared = TrainerConfig(learner=LEARNER, shared=True)
     (result,) = play([make_trial(0)], 1, shared)
     assert result.keeper_weights is not None
     assert result.keeper_weights[0].any()
@@ -240,7 +240,7 @@ def test_rules_that_never_stop_a_trial_are_refused():
     with pytest.raises(AgentError, match="keeper policy 'best'"):
         play([make_trial(0, keeper_policy="best")], 1)
     with pytest.raises(AgentError, match="ordering 'x'"):
-        Trainer(TrainerConfig(ordering="x"), 1)
+        Trainer(TrainerConfig(learner=LearnerConfig(ordering="x")), 1)
 
 
 def test_takers_that_learn_end_episodes_of_fixed_keepers_sooner_than_hand_coded_ones():

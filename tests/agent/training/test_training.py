@@ -1,6 +1,5 @@
 """Trainings: the same in any number of processes, and gone on with after any interruption."""
 
-import dataclasses
 import json
 import os
 import signal
@@ -15,7 +14,9 @@ import pytest
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import load_weights
+from keepaway_agent.settings import changed
 from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import Progress
@@ -23,7 +24,7 @@ from keepaway_agent.training.workers import play
 from keepaway_sim.errors import KeepawayError
 
 SCRIPT = Path(__file__).parents[3] / "scripts/train.py"
-SHORT = Training(episodes=4, seed=11, lambda_=0.2)
+SHORT = Training(episodes=4, seed=11, learner=LearnerConfig(lambda_=0.2))
 
 
 def train(*arguments):
@@ -49,13 +50,13 @@ def test_the_number_of_processes_and_fields_changes_nothing():
 
 
 def test_an_error_in_a_process_is_raised_here(tmp_path):
-    lost = dataclasses.replace(SHORT, load_weights=str(tmp_path / "none.npz"))
+    lost = changed(SHORT, {"load_weights": str(tmp_path / "none.npz")})
     with pytest.raises(ValueError, match=r"none\.npz cannot be read"):
         list(play(lost, [0, 1], processes=2))
 
 
 def test_a_folder_holds_what_was_trained(tmp_path):
-    training = dataclasses.replace(SHORT, taker_policy="learn")
+    training = changed(SHORT, {"taker_policy": "learn"})
     folder = TrainingFolder(tmp_path / "out", training, "scripts/train.py --episodes 4")
     (result,) = play(training, [3])
     folder.save(result)
@@ -87,14 +88,14 @@ def test_the_first_trials_team_lies_in_the_folder_itself_and_can_be_trained_on(t
         first.save(result)
     names = sorted(file.name for file in first.path.glob("*.npz"))
     assert names == ["keeper_1.npz", "keeper_2.npz", "keeper_3.npz"]
-    more = dataclasses.replace(SHORT, load_weights=str(first.path))
+    more = changed(SHORT, {"load_weights": str(first.path)})
     second = TrainingFolder(tmp_path / "second", more)
     for result in play(more, [0]):
         second.save(result)
     earlier, later = (load_weights(f.path / "keeper_3.npz") for f in (first, second))
     assert later.episodes == 8
     assert later.hours > earlier.hours
-    one = dataclasses.replace(SHORT, load_weights=str(first.path / "keeper_3.npz"))
+    one = changed(SHORT, {"load_weights": str(first.path / "keeper_3.npz")})
     for weights in one.start():
         np.testing.assert_array_equal(weights.values, earlier.values)
 
@@ -103,7 +104,7 @@ def test_a_folder_is_gone_on_with_only_by_the_same_training(tmp_path):
     TrainingFolder(tmp_path, SHORT)
     assert TrainingFolder(tmp_path, SHORT).done == []
     with pytest.raises(AgentError, match=r"alpha=0\.125, not 0\.5: use the same settings, or name"):
-        TrainingFolder(tmp_path, dataclasses.replace(SHORT, alpha=0.5))
+        TrainingFolder(tmp_path, changed(SHORT, {"alpha": 0.5}))
     record = json.loads((tmp_path / "training.json").read_text())
     (tmp_path / "training.json").write_text(json.dumps(record | {"code_version": "0.0.1"}))
     with pytest.raises(AgentError, match=r"begun by version 0\.0\.1"):

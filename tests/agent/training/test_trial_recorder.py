@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from keepaway_agent.checks.decisions import check_decisions
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import TrialResult
@@ -17,7 +18,8 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome
 
 EPISODES = 30
-TRAINING = Training(episodes=EPISODES, seed=5, taker_policy="learn", lambda_=0.5, epsilon=0.1)
+LEARNER = LearnerConfig(lambda_=0.5, epsilon=0.1)
+TRAINING = Training(episodes=EPISODES, seed=5, taker_policy="learn", learner=LEARNER)
 
 
 def record(
@@ -83,7 +85,7 @@ def test_keepers_that_began_with_weights_are_checked_with_them(tmp_path):
     folder = TrainingFolder(tmp_path / "weights", TRAINING)
     for result in play(TRAINING, [0]):
         folder.save(result)
-    going_on = Training(episodes=5, policy="greedy", load_weights=str(folder.path), lambda_=0.5)
+    going_on = Training(episodes=5, policy="greedy", load_weights=str(folder.path), learner=LEARNER)
     record(tmp_path / "bag", going_on)
     checked = check_decisions(MatchBag(tmp_path / "bag"))
     assert (checked.episodes, checked.difference) == (5, None)

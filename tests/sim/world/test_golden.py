@@ -24,7 +24,7 @@ from keepaway_sim.world.world import World
 FILE = Path(__file__).with_name("golden_episodes.json")
 CASES = {
     "3v2 2005": (Task(3, 2), profile("2005")),
-    "3v2 2005 narrow": (Task(3, 2), profile("2005", visible_angle=90.0)),
+    "3v2 2005 narrow": (Task(3, 2), profile("2005", visible_angle_deg=90.0)),
     "4v3 v19": (Task(4, 3), profile("v19")),
     "5v4 30x20": (Task(5, 4, 30.0, 20.0), profile("2005")),
 }

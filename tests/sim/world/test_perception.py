@@ -15,7 +15,7 @@ from keepaway_sim.world.state import KICK
 
 approx = pytest.approx
 
-NARROW = noiseless(profile("2005", visible_angle=90.0))
+NARROW = noiseless(profile("2005", visible_angle_deg=90.0))
 ROUNDED = profile("2005", self_position_error=0.0, self_yaw_error=0.0)
 
 WIDE = """

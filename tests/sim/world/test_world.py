@@ -56,8 +56,8 @@ def assert_same(one: list[np.ndarray], other: list[np.ndarray]) -> None:
 CASES = [
     pytest.param(Task(3, 2), profile("2005"), id="3v2"),
     pytest.param(Task(4, 3, 30, 20), profile("v19"), id="4v3 v19"),
-    pytest.param(Task(2, 1), profile("2005", visible_angle=90.0), id="2v1 narrow"),
-    pytest.param(Task(11, 11, 10, 10), profile("v19", visible_angle=90.0), id="11v11 crowded"),
+    pytest.param(Task(2, 1), profile("2005", visible_angle_deg=90.0), id="2v1 narrow"),
+    pytest.param(Task(11, 11, 10, 10), profile("v19", visible_angle_deg=90.0), id="11v11 crowded"),
 ]
 
 
@@ -114,7 +114,7 @@ def test_the_same_seed_gives_the_same_episodes_and_another_seed_others():
 
 
 def test_a_field_that_is_started_again_knows_nothing_of_before():
-    world, fresh = (started(Task(), profile("2005", visible_angle=90.0), [5]) for _ in range(2))
+    world, fresh = (started(Task(), profile("2005", visible_angle_deg=90.0), [5]) for _ in range(2))
     requests = Requests(world, [5])
     for _ in range(90):
         world.step(*requests.draw())
@@ -358,7 +358,7 @@ def test_without_noise_nothing_is_drawn_between_kick_offs():
         {"self_yaw_error": 0.0},
         {"hearing": False},
         {"whole_commands": False},
-        {"visible_angle": 90.0},
+        {"visible_angle_deg": 90.0},
     ],
     ids=lambda switch: next(iter(switch)),
 )
@@ -408,10 +408,12 @@ def check_limits(world: World) -> None:
     ("task", "config", "steps"),
     [
         pytest.param(Task(3, 2), profile("2005"), 1600, id="3v2 2005"),
-        pytest.param(Task(3, 2, 20, 20), profile("v19", visible_angle=90.0), 1600, id="3v2 v19"),
+        pytest.param(
+            Task(3, 2, 20, 20), profile("v19", visible_angle_deg=90.0), 1600, id="3v2 v19"
+        ),
         pytest.param(Task(4, 3), profile("v19"), 600, id="4v3 v19"),
         pytest.param(Task(2, 1, 100, 10), profile("2005"), 100, id="2v1 long"),
-        pytest.param(Task(11, 11, 10, 10), profile("2005", visible_angle=45.0), 40, id="11v11"),
+        pytest.param(Task(11, 11, 10, 10), profile("2005", visible_angle_deg=45.0), 40, id="11v11"),
     ],
 )
 def test_a_million_random_cycles_stay_finite_and_within_limits(task, config, steps):

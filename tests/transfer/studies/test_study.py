@@ -117,7 +117,7 @@ def test_rows_are_paired_where_trials_of_one_number_share_a_source_or_a_seed(
 def test_constants_of_world_and_learner_are_changed_by_name():
     study = study_from({**PLAIN, "world": {"kick_rand": 0.1}, "learner": {"lambda_": 0.5}})
     assert study.world_settings.physics.kick_rand == 0.1
-    assert study.sarsa.lambda_ == 0.5
+    assert study.learner_config.lambda_ == 0.5
 
 
 @pytest.mark.parametrize(

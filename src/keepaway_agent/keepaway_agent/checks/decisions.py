@@ -13,6 +13,7 @@ from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import read_weights
 from keepaway_agent.playing.agent import Agent, AgentConfig, Decision, MatchFacts, Perceived
 from keepaway_agent.playing.policies import View
+from keepaway_agent.settings import build
 from keepaway_sim.bags.match_bag import MatchBag, Track
 from keepaway_sim.bags.verify import Checked, Difference, whole_episodes
 from keepaway_sim.errors import KeepawayError
@@ -66,8 +67,8 @@ def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
         if "command" in told.get(name, {}):
             continue
         try:
-            config = AgentConfig(**told.get(name, {}))
-        except TypeError as error:
+            config = build(AgentConfig, told.get(name, {}))
+        except AgentError as error:
             raise AgentError(
                 f"{bag.reader.path}: {name} has settings of no player: {error}"
             ) from error

@@ -16,6 +16,7 @@ import numpy as np
 from keepaway_agent.actions import Outcome
 from keepaway_agent.fidelity.reference import GOAL_OUT, Cell
 from keepaway_agent.fidelity.trajectories import Trajectories, process_statistics
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.workers import play
@@ -109,7 +110,7 @@ def training(cell: Cell, episodes: int) -> Training:
     return Training(
         task=cell.task,
         profile=cell.profile,
-        visible_angle=float(cell.visible_angle),
+        visible_angle_deg=float(cell.visible_angle),
         policy=cell.policy,
         episodes=episodes,
         seed=SEED,
@@ -142,9 +143,11 @@ def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
     learner is the reference framework's: its order of players and its tile widths.
     """
     trials = Training(
-        task="3v2", profile=profile, ordering="k1", tile_widths="framework",
-        episodes=episodes, seed=SEED,
-    )  # fmt: skip
+        profile=profile,
+        episodes=episodes,
+        seed=SEED,
+        learner=LearnerConfig(ordering="k1", tile_widths="framework"),
+    )
     durations = {r.trial.label: r.durations for r in play(trials, range(num_trials))}
     played = np.stack([durations[number] for number in range(num_trials)])
     blocks = played[:, : episodes // BLOCK * BLOCK].reshape(num_trials, -1, BLOCK)

@@ -22,7 +22,6 @@ Learners are rows of arrays (`Learners`); every function works on one row. They 
 a node with one learner and a trainer with thousands call the same ones.
 """
 
-from dataclasses import dataclass, fields
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -36,32 +35,12 @@ from keepaway_agent.learning.cmac import (
     add_to_active,
     tile_cells,
 )
+from keepaway_agent.learning.config import SarsaConfig
 
 NO_ACTION: Final = -1
 """The last action of a learner that has not decided yet in this episode."""
 UNIFORMS_PER_CHOICE: Final = 3
 """Random numbers that one choice takes, whether it needs them or not: explore? which? tie."""
-
-
-@dataclass(frozen=True)
-class SarsaConfig:
-    """How a learner learns. Defaults are those of the papers' player framework.
-
-    Raises:
-        AgentError: a value outside its range.
-    """
-
-    alpha: float = 0.125  # step size, shared out among the active tiles
-    gamma: float = 1.0  # discount per cycle
-    lambda_: float = 0.0  # decay of the traces per decision
-    epsilon: float = 0.01  # share of decisions that are random
-    min_trace: float = 0.01  # smaller traces count as 0 (only with lambda > 0; 0 keeps them all)
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (isinstance(value, (int, float)) and 0.0 <= value <= 1.0):
-                raise AgentError(f"{field.name}={value!r}: give a number from 0 to 1")
 
 
 class Learners(NamedTuple):

@@ -23,8 +23,9 @@ from keepaway_agent.actions import Role, action_names
 from keepaway_agent.errors import WeightsError
 from keepaway_agent.files import moved_into_place
 from keepaway_agent.learning.cmac import NUM_TILINGS, Tiling
+from keepaway_agent.learning.config import SarsaConfig
 from keepaway_agent.learning.features import ORDERINGS, feature_names
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.settings import build, flat
 from keepaway_agent.texts import one_line, shown
 
 FORMAT: Final = "keepaway-weights"
@@ -202,6 +203,7 @@ def to_metadata(weights: LearnedWeights) -> dict[str, Any]:
     """What a file says beside the array, as plain data."""
     plain = asdict(weights)
     del plain["values"]
+    plain["sarsa"] = flat(weights.sarsa)
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -224,7 +226,7 @@ def from_metadata(metadata: dict[str, Any], values: np.ndarray) -> LearnedWeight
         values=values,
         role=Role[str(rest.pop("role")).upper()],
         tiling=Tiling(**{name: tuple(each) for name, each in rest.pop("tiling").items()}),
-        sarsa=SarsaConfig(**rest.pop("sarsa")),
+        sarsa=build(SarsaConfig, rest.pop("sarsa")),
         **rest,
     )
     expected = json.loads(json.dumps(to_metadata(weights), allow_nan=False))

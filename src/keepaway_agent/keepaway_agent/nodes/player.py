@@ -8,13 +8,11 @@ perception comes, and answers perceptions.
 import faulthandler
 import gc
 import signal
-from dataclasses import dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -25,7 +23,8 @@ from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
-from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, check_config
+from keepaway_agent.nodes.parameters import declare_settings
+from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, WeightsFiles, check_config
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 
@@ -39,17 +38,6 @@ ANNOUNCEMENT_PERIOD = (
 PATIENCE = 0.25  # [s] at most, from being told to end to ending
 LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
-FIXED = ParameterDescriptor(read_only=True)
-
-
-@dataclass(frozen=True)
-class Files:
-    """A player's parameters about its weights."""
-
-    load_weights: str = ""  # file to start from; empty: know nothing
-    save_weights: str = ""  # file to write at the end; empty: none
-    save_every: int = 100  # [episodes] and in between; 0: at the end only
-    resume: bool = False  # go on from save_weights if that file is there already
 
 
 class Player(Node):
@@ -72,9 +60,9 @@ class Player(Node):
         super().__init__(f"{role.name.lower()}_1", **node_options)
         self.agent: Agent | None = None
         self._role = role
-        self._config = AgentConfig(**self._declare(AgentConfig))
+        self._config = declare_settings(self, AgentConfig)
         check_config(role, self._config)
-        files = Files(**self._declare(Files))
+        files = declare_settings(self, WeightsFiles)
         self._save_every = files.save_every
         self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
         self._start_weights = self._weights_to_start_from(files)
@@ -104,14 +92,7 @@ class Player(Node):
             raise AgentError("no match yet, so nothing has been learned")
         return self.agent.learned(self.get_name())
 
-    def _declare(self, settings: type) -> dict[str, Any]:
-        """Declare a parameter for every field of a dataclass; their values by name."""
-        return {
-            field.name: self.declare_parameter(field.name, field.default, FIXED).value
-            for field in fields(settings)
-        }
-
-    def _weights_to_start_from(self, files: Files) -> LearnedWeights | None:
+    def _weights_to_start_from(self, files: WeightsFiles) -> LearnedWeights | None:
         """Its own saved ones to resume from, or others, or none."""
         own = self._weights_path
         if own is None or not own.exists():

@@ -4,9 +4,10 @@ The rules are those of `policies`; this keeps what one player needs from cycle t
 learner, its random numbers, and what it answered last, because messages may come twice or never.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
+import attrs
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
@@ -14,10 +15,11 @@ from keepaway_agent.compiled import entry_point
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import LearnedWeights, check_fits
 from keepaway_agent.playing import policies
 from keepaway_agent.playing.policies import View, make_player
+from keepaway_agent.settings import group, setting
 
 POLICY_STREAM = 1
 """Second entry of a player's spawn key; 0 is the world's."""
@@ -46,24 +48,27 @@ class MatchFacts:
         return Role.KEEPER if index < self.num_keepers else Role.TAKER
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class AgentConfig:
     """How a player plays and learns."""
 
-    policy: str = "hand"  # random, hold (keepers), hand, learn or greedy
-    alpha: float = 0.125  # step size, shared out among the active tiles
-    gamma: float = 1.0  # discount per cycle
-    lambda_: float = 0.0  # decay of the traces per decision
-    epsilon: float = 0.01  # share of decisions that are random
-    min_trace: float = 0.01  # smaller traces count as 0
-    ordering: str = "ball"  # what ranks players: their distance to the ball, or to K1 (k1)
-    tile_widths: str = "default"  # or framework: UT Austin's
-    decision_interval: int = policies.TAKER_DECISION_INTERVAL  # [cycles] between a taker's choices
+    policy: str = setting("hand", "random, hold (keepers), hand, learn or greedy")
+    learner: LearnerConfig = group(LearnerConfig)
+    decision_interval: int = setting(
+        policies.TAKER_DECISION_INTERVAL, "between a taker's choices", "cycles", "[1, 1000]"
+    )
 
-    @property
-    def sarsa(self) -> SarsaConfig:
-        """What of it the learning rule takes."""
-        return SarsaConfig(**{f.name: getattr(self, f.name) for f in fields(SarsaConfig)})
+
+@attrs.frozen
+class WeightsFiles:
+    """Where a player's weights come from and go to."""
+
+    load_weights: str = setting("", "file to start from; empty: know nothing")
+    save_weights: str = setting("", "file to write at the end; empty: none")
+    save_every: int = setting(
+        100, "and in between, every N episodes; 0: at the end only", "episodes", "[0, 1000000000]"
+    )
+    resume: bool = setting(False, "continue from save_weights if that file exists")
 
 
 def check_config(role: Role, config: AgentConfig) -> None:
@@ -73,9 +78,7 @@ def check_config(role: Role, config: AgentConfig) -> None:
         AgentError: says which, and what to give instead.
     """
     index = 0 if role == Role.KEEPER else 2
-    make_player(index, 2, config.policy, config.ordering, config.decision_interval)
-    make_tiling(role, 2, 1, profile=config.tile_widths)
-    _ = config.sarsa  # checks its numbers
+    make_player(index, 2, config.policy, config.learner.ordering, config.decision_interval)
 
 
 class Decision(NamedTuple):
@@ -123,14 +126,14 @@ class Agent:
             facts.num_takers,
             facts.field_length,
             facts.field_width,
-            self.config.tile_widths,
+            self.config.learner.tile_widths,
         )
-        self.learners = sarsa.make_learners(1, facts.num_keepers, self.tiling, self.config.sarsa)
+        self.learners = sarsa.make_learners(1, facts.num_keepers, self.tiling, self.config.learner)
         self._player = make_player(
             index,
             facts.num_keepers,
             self.config.policy,
-            self.config.ordering,
+            self.config.learner.ordering,
             self.config.decision_interval,
         )
         self._order = np.zeros(facts.num_players, dtype=np.int64)
@@ -160,7 +163,7 @@ class Agent:
             WeightsError: weights for something else than this player does here.
         """
         teams = (self.facts.num_keepers, self.facts.num_takers)
-        check_fits(weights, self.role, *teams, self.tiling, self.config.ordering)
+        check_fits(weights, self.role, *teams, self.tiling, self.config.learner.ordering)
         sarsa.tiles_of(self.learners, 0)[:] = weights.values
         self.episodes, self.hours = weights.episodes, weights.hours
 
@@ -175,8 +178,8 @@ class Agent:
             field_length=facts.field_length,
             field_width=facts.field_width,
             tiling=self.tiling,
-            ordering=self.config.ordering,
-            sarsa=self.config.sarsa,
+            ordering=self.config.learner.ordering,
+            sarsa=self.config.learner.sarsa,
             episodes=self.episodes,
             hours=self.hours,
             seed=facts.seed,

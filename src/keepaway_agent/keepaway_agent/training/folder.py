@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import fcntl
 import hashlib
 import json
@@ -19,6 +18,7 @@ from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.files import check_writable, name_beside, write_whole
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
+from keepaway_agent.settings import build, flat
 from keepaway_agent.texts import one_line
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import TrialResult
@@ -53,7 +53,7 @@ class TrainingFolder:
             AgentError: a folder of something else, or of other settings or another version.
         """
         self.path, self._training, self._command = path, training, command
-        settings = json.loads(json.dumps(dataclasses.asdict(training)))
+        settings = flat(training)
         self._record = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
@@ -158,8 +158,8 @@ class TrainingFolder:
                 field_length=task.field_length,
                 field_width=task.field_width,
                 tiling=config.tiling(role),
-                ordering=training.ordering,
-                sarsa=config.sarsa,
+                ordering=config.learner.ordering,
+                sarsa=config.learner.sarsa,
                 episodes=len(result.durations) + (earlier.episodes if earlier else 0),
                 hours=result.hours + (earlier.hours if earlier else 0.0),
                 seed=training.seed,
@@ -180,8 +180,9 @@ def _check_same(path: Path, record: dict[str, Any], any_code: bool) -> None:
     """Refuse to mix results of different settings or versions."""
     try:
         there = json.loads((path / "training.json").read_text(encoding="utf-8"))
-        settings, version = dict(there["settings"]), there["code_version"]
-    except (ValueError, KeyError, TypeError) as error:
+        settings = flat(build(Training, there["settings"]))
+        version = there["code_version"]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise AgentError(f"{path / 'training.json'} is no training's: {error!r}") from error
     for name, value in record["settings"].items():
         if settings.get(name) != value:

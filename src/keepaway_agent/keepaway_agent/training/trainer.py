@@ -231,13 +231,13 @@ class _Team:
             num_fields * self._size,
             task.num_keepers,
             config.tiling(role),
-            config.sarsa,
+            config.learner,
             self._size if keeps and config.shared else 1,
         )
         self._has_learners = np.zeros(num_fields, dtype=np.bool_)
         first = 0 if keeps else task.num_keepers
         self.player = make_player(
-            first, task.num_keepers, "learn", config.ordering, config.decision_interval
+            first, task.num_keepers, "learn", config.learner.ordering, config.decision_interval
         )
 
     def prepare(self, number: int, policy: str, weights: np.ndarray | None) -> None:

@@ -9,19 +9,17 @@ players of the first trial learned lies in the folder itself too, for whoever ne
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import attrs
 import numpy as np
 
 from keepaway_agent.actions import Role
-from keepaway_agent.errors import AgentError
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import (
     HOURS_PER_CYCLE,
     LearnedWeights,
@@ -30,7 +28,8 @@ from keepaway_agent.learning.weights import (
     write_weights,
 )
 from keepaway_agent.playing.agent import AgentConfig
-from keepaway_agent.playing.policies import TAKER_DECISION_INTERVAL, make_player
+from keepaway_agent.playing.policies import make_player
+from keepaway_agent.settings import flat, group, same, setting, settings_of
 from keepaway_agent.training.trial import (
     StopRule,
     TrainerConfig,
@@ -39,13 +38,13 @@ from keepaway_agent.training.trial import (
 )
 from keepaway_agent.training.trial_recorder import TrialRecorder
 from keepaway_sim.task import Task
-from keepaway_sim.world import config as world_config
+from keepaway_sim.world.config import Config, Vision, profile
 
 RECORDED_TRIAL: Final = 0
 """The trial that can be recorded: it is the same as a match of ROS nodes with the seed."""
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class Training:
     """Everything that decides what the trials of a training give.
 
@@ -53,47 +52,38 @@ class Training:
         AgentError, KeepawayError: settings with which nothing can be trained, by name.
     """
 
-    task: str = "3v2"  # keepers v takers
-    field: str = "25x25"  # length x width [m]
-    profile: str = "2005"  # of the world's constants; or v19
-    visible_angle: float = 360.0  # [deg] of the players' view cone
-    policy: str = "learn"  # of the keepers: random, hold, hand, learn or greedy
-    taker_policy: str = "hand"  # random, hand, learn or greedy
-    episodes: int = 1000  # of every trial
-    hours: float = 0.0  # simulated, after which a trial stops anyway; 0 sets no limit
-    seed: int = 0  # of all trials; each has its own random numbers
-    load_weights: str = ""  # weights file for all keepers, or folder with keeper_1.npz, ...
-    alpha: float = 0.125  # step size, shared out among the active tiles
-    gamma: float = 1.0  # discount per cycle
-    lambda_: float = 0.0  # decay of the traces per decision
-    epsilon: float = 0.01  # share of decisions that are random
-    min_trace: float = 0.01  # smaller traces count as 0
-    ordering: str = "ball"  # what ranks players: their distance to the ball, or to K1 (k1)
-    tile_widths: str = "default"  # or framework
-    decision_interval: int = TAKER_DECISION_INTERVAL  # [cycles] between a taker's choices
-    shared: bool = False  # all keepers of a trial learn one value function
+    task: str = setting("3v2", "keepers v takers")
+    field: str = setting("25x25", "length x width of the field", "m")
+    profile: str = same(Config, "profile")
+    visible_angle_deg: float = same(Vision, "visible_angle_deg")
+    policy: str = setting("learn", "of the keepers: random, hold, hand, learn or greedy")
+    taker_policy: str = setting("hand", "of the takers: random, hand, learn or greedy")
+    episodes: int = setting(1000, "of every trial", "episodes", "[1, 1000000000]")
+    hours: float = setting(
+        0.0, "simulated, after which a trial stops anyway; 0 sets no limit", "h", "[0, 1000000]"
+    )
+    seed: int = setting(
+        0, "of all trials; each has its own random numbers", "", "[0, 9223372036854775807]"
+    )
+    load_weights: str = setting("", "weights file for all keepers, or folder with keeper_1.npz, ..")
+    learner: LearnerConfig = group(LearnerConfig)
+    decision_interval: int = same(AgentConfig, "decision_interval")
+    shared: bool = setting(False, "all keepers of a trial learn one value function")
 
-    def __post_init__(self) -> None:
-        if not self.hours >= 0:
-            raise AgentError(f"hours={self.hours}: give simulated hours, or 0 for no limit")
-        if self.seed < 0:
-            raise AgentError(f"seed={self.seed}: give 0 or a positive number")
+    def __attrs_post_init__(self) -> None:
         config, _ = self.trainer, self.stop
         num_keepers = config.task.num_keepers
-        make_player(0, num_keepers, self.policy, self.ordering)
-        make_player(num_keepers, num_keepers, self.taker_policy, interval=self.decision_interval)
+        make_player(0, num_keepers, self.policy)
+        make_player(num_keepers, num_keepers, self.taker_policy)
         config.tiling(Role.KEEPER)
 
     @property
     def trainer(self) -> TrainerConfig:
         """What the trainer must know of it."""
-        sarsa = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(SarsaConfig)}
         return TrainerConfig(
             task=Task.parse(self.task, self.field),
-            world=world_config.profile(self.profile, visible_angle=self.visible_angle),
-            sarsa=SarsaConfig(**sarsa),
-            ordering=self.ordering,
-            tile_widths=self.tile_widths,
+            world=profile(self.profile, visible_angle_deg=self.visible_angle_deg),
+            learner=self.learner,
             decision_interval=self.decision_interval,
             shared=self.shared,
         )
@@ -119,7 +109,7 @@ class Training:
         tiling = config.tiling(Role.KEEPER)
         for each in weights:
             teams = config.task.num_keepers, config.task.num_takers
-            check_fits(each, Role.KEEPER, *teams, tiling, self.ordering)
+            check_fits(each, Role.KEEPER, *teams, tiling, self.learner.ordering)
         return weights
 
     def trial(
@@ -155,8 +145,8 @@ class Training:
 
     def _agents(self) -> list[dict[str, Any]]:
         """How each player plays, as the fields of AgentConfig."""
-        own = [entry.name for entry in dataclasses.fields(AgentConfig) if hasattr(self, entry.name)]
-        settings = {name: getattr(self, name) for name in own}
+        own = settings_of(AgentConfig)
+        settings = {name: value for name, value in flat(self).items() if name in own}
         task = self.trainer.task
         takers = settings | {"policy": self.taker_policy}
         return [settings] * task.num_keepers + [takers] * task.num_takers

@@ -11,7 +11,7 @@ import numpy as np
 from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.cmac import Tiling, make_tiling
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import HOURS_PER_CYCLE
 from keepaway_agent.playing import policies
 from keepaway_sim.task import Task
@@ -25,9 +25,7 @@ class TrainerConfig:
 
     task: Task = field(default_factory=Task)
     world: Config = field(default_factory=Config)
-    sarsa: SarsaConfig = field(default_factory=SarsaConfig)
-    ordering: str = "ball"  # what ranks players in keepers' state variables, or k1
-    tile_widths: str = "default"  # or framework
+    learner: LearnerConfig = field(default_factory=LearnerConfig)
     decision_interval: int = policies.TAKER_DECISION_INTERVAL  # [cycles] between takers' choices
     shared: bool = False  # all keepers of a trial learn one value function
 
@@ -40,7 +38,7 @@ class TrainerConfig:
             task.num_takers,
             task.field_length,
             task.field_width,
-            self.tile_widths,
+            self.learner.tile_widths,
         )
 
 

@@ -1,45 +1,77 @@
-"""Command-line options and ROS arguments of a dataclass: one declaration for both. No ROS."""
+"""Command-line options and ROS arguments of declared settings. No ROS."""
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import inspect
 import json
 import re
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any, TypeVar
 
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.settings import Setting, as_text, build, settings_of
 
-_COMMENTED_FIELD = re.compile(r"^ {4}(\w+): .*?#\s*(.+)$", re.MULTILINE)
+Group = TypeVar("Group")
 
 
 def add_options(
-    parser: argparse.ArgumentParser, settings: type, without: Collection[str] = ()
+    parser: argparse.ArgumentParser,
+    settings: type,
+    only: Collection[str] = (),
+    without: Collection[str] = (),
+    with_defaults: bool = False,
 ) -> None:
-    """Give a parser an option for every field of a dataclass; its comment is the option's help.
+    """Give a parser an option for every setting of a class, groups of settings included.
 
-    Options that are not given are not in the parsed namespace.
+    `chosen` makes the settings of what was parsed.
 
     Args:
         parser: that gets them.
-        settings: the dataclass.
-        without: fields that the command line says otherwise.
+        settings: an attrs class whose fields are made by `setting`.
+        only: names of those wanted; all if there are none.
+        without: names of those that the command line asks for in another way.
+        with_defaults: whether options that are not given are in the parsed namespace.
     """
-    comments = dict(_COMMENTED_FIELD.findall(inspect.getsource(settings)))
     group = parser.add_argument_group(settings.__name__)
-    for field in dataclasses.fields(settings):
-        if field.name in without:
-            continue
-        comment = comments.get(field.name, "").replace("%", "%%")
-        group.add_argument(
-            "--" + field.name.strip("_").replace("_", "-"),
-            dest=field.name,
-            type=_truth if isinstance(field.default, bool) else type(field.default),
-            default=argparse.SUPPRESS,
-            metavar=type(field.default).__name__.upper(),
-            help=f"{comment} (default {field.default!r})",
-        )
+    for name, declared in settings_of(settings).items():
+        if name not in without and (not only or name in only):
+            _add_option(group, declared, declared.default if with_defaults else argparse.SUPPRESS)
+
+
+def chosen(settings: type[Group], options: argparse.Namespace) -> Group:
+    """The settings that a command line gave, with the defaults of those that it did not.
+
+    Raises:
+        SettingError: a value that is refused.
+    """
+    known = settings_of(settings)
+    return build(settings, {n: value for n, value in vars(options).items() if n in known})
+
+
+def option(name: str) -> str:
+    """The option of a setting.
+
+    >>> option("lambda_")
+    '--lambda'
+    """
+    return "--" + name.strip("_").replace("_", "-")
+
+
+def _add_option(group: Any, declared: Setting, otherwise: Any) -> None:
+    """An option; a truth may be given without a value, too."""
+    unit = f" [{declared.unit}]" if declared.unit else ""
+    default = as_text(declared.default) if declared.default != "" else '""'
+    help_text = f"{declared.text}{unit} (default {default})".replace("%", "%%")
+    kind, spread = declared.kind, {"nargs": "?", "const": True} if declared.kind is bool else {}
+    group.add_argument(
+        *(option(name) for name in (declared.name, *declared.was)),
+        dest=declared.name,
+        type=_truth if kind is bool else kind,
+        default=otherwise,
+        metavar="|".join(declared.choices) or kind.__name__.upper(),
+        help=help_text,
+        **spread,
+    )
 
 
 def parse_node_arguments(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> list[str]:

@@ -2,38 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import attrs
 
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.settings import setting
+
+MOST = 2**63 - 1
+"""The largest whole number of a ROS parameter."""
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class MatchSettings:
     """The simulator's parameters beside the world's constants.
 
     Raises:
-        KeepawayError: a value outside its range.
+        SettingError: a value outside its range.
     """
 
-    task: str = "3v2"
-    field: str = "25x25"  # length x width [m]
-    seed: int = 0
-    speed: float = 0.0  # simulated over wall time; 0: as fast as the players answer
-    episodes: int = 0  # to play, those before first_episode included; 0: without end
-    first_episode: int = 0  # its number; to go on with a match whose simulator died
-    answer_timeout: float = 2.0  # [s] wall time; a player who takes longer is missing
-    autostart: bool = True  # kick off when all players are there
-    record: str = ""  # folder of a bag to write; empty: none
-    record_info: str = "{}"  # JSON object of texts, written into the bag
-    record_attachments: str = "{}"  # JSON object, name -> file to put into the bag
-    wait_for_recorder: bool = False  # play no faster than recorders' nodes follow
-
-    def __post_init__(self) -> None:
-        for name in ("seed", "episodes", "first_episode", "speed"):
-            if not 0 <= getattr(self, name) < float("inf"):
-                raise KeepawayError(f"{name}={getattr(self, name)}: give 0 or more")
-        if not 0 < self.answer_timeout < float("inf"):
-            raise KeepawayError(f"answer_timeout={self.answer_timeout}: give seconds above 0")
+    task: str = setting("3v2", "keepers v takers")
+    field: str = setting("25x25", "length x width of the field", "m")
+    seed: int = setting(0, "every random number of the match follows from it", "", f"[0, {MOST}]")
+    speed: float = setting(
+        0.0, "simulated over wall time; 0: as fast as the players answer", "1", "[0, 10000]"
+    )
+    episodes: int = setting(
+        0,
+        "to play, those before first_episode included; 0: without end",
+        "episodes",
+        "[0, 1000000000]",
+    )
+    first_episode: int = setting(
+        0, "its number, to continue a match whose simulator died", "", "[0, 1000000000]"
+    )
+    answer_timeout: float = setting(
+        2.0, "wall time after which a player who has not answered is unresponsive", "s", "(0, 3600]"
+    )
+    autostart: bool = setting(True, "kick off when all players are ready")
+    record: str = setting("", "folder of a bag to write; empty: none")
+    record_info: str = setting("{}", "JSON object of texts, written into the bag")
+    record_attachments: str = setting("{}", "JSON object, name -> file to put into the bag")
+    wait_for_recorder: bool = setting(
+        False, "begin with the recorders' nodes, and play no faster than they follow"
+    )
 
 
 CHANGEABLE = ("speed", "answer_timeout")

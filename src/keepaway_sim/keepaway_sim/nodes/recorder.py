@@ -10,9 +10,9 @@ import signal
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from typing import Any
 
+import attrs
 import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.exceptions import InvalidParameterTypeException
@@ -27,7 +27,9 @@ from keepaway_sim.bags.timeline import OwnTimes
 from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.ros.subscribing import declared, listen, offered_qos, take_all, to_profile
+from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.subscribing import listen, offered_qos, take_all, to_profile
+from keepaway_sim.settings import flat, setting
 from keepaway_sim.version import code_version
 from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.messages import (
@@ -62,24 +64,24 @@ SAID_BY_PLAYERS = {
 }
 
 
-@dataclass(frozen=True)
-class Settings:
+@attrs.frozen
+class RecorderSettings:
     """The recorder's parameters.
 
     Raises:
         KeepawayError: a value outside its range.
     """
 
-    path: str = ""  # folder of the bag to write
-    compression: str = "zstd"  # of its chunks: zstd, lz4 or none
-    history: int = 2000  # messages that a topic keeps until they are taken
-    more_topics: str = ""  # to record too, as /topic=package/msg/Name, comma-separated
+    path: str = setting("", "folder of the bag to write")
+    compression: str = setting("zstd", "of its chunks", choices=("zstd", "lz4", "none"))
+    history: int = setting(
+        2000, "that a topic keeps until they are taken", "messages", "[1, 1000000]"
+    )
+    more_topics: str = setting("", "to record too, as /topic=package/msg/Name, comma-separated")
 
-    def __post_init__(self) -> None:
+    def __attrs_post_init__(self) -> None:
         if not self.path:
             raise KeepawayError("path is not set: name the bag that is to be made")
-        if self.history < 1:
-            raise KeepawayError(f"history={self.history}: give 1 or more")
 
     def topics(self) -> dict[str, str]:
         """The types of the topics that are recorded from the start on."""
@@ -106,7 +108,7 @@ class Recorder(Node):
             KeepawayError: no path was given, or something is there.
         """
         super().__init__("recorder", **node_options)
-        self.settings = declared(self, Settings)
+        self.settings = declare_settings(self, RecorderSettings)
         self.gaps = GapCounter()
         self._subscriptions_by_topic: dict[str, tuple[str, Subscription]] = {}
         self._times = OwnTimes()
@@ -117,7 +119,7 @@ class Recorder(Node):
         self._recorded = self.create_publisher(
             Time, "recorded", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         )
-        info = {"recorder": json.dumps(asdict(self.settings)), "code_version": code_version()}
+        info = {"recorder": json.dumps(flat(self.settings)), "code_version": code_version()}
         self.bag = BagWriter(self.settings.path, info, self.settings.compression)
 
     def poll(self) -> int:

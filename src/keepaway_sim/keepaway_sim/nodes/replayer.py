@@ -10,18 +10,16 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
+import attrs
 import rclpy
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
@@ -32,7 +30,9 @@ from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.ros.subscribing import declared, message_class, to_profile
+from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.subscribing import message_class, to_profile
+from keepaway_sim.settings import setting
 from keepaway_sim.wire import cdr
 from keepaway_sim.wire.messages import SECOND
 
@@ -42,28 +42,43 @@ LONGEST_SPIN = 0.1  # [s]
 LONGEST_LINGER = 5.0  # [s] for a listener that does not listen any more
 
 
-@dataclass(frozen=True)
-class Settings:
+@attrs.frozen
+class ReplayerSettings:
     """The replayer's parameters.
 
     Raises:
         KeepawayError: a value outside its range.
     """
 
-    path: str = ""  # folder of the bag
-    rate: float = 1.0  # simulated over wall time; 0: as fast as possible
-    start: float = -1.0  # simulated time to begin at [s]; -1: the bag's beginning
-    end: float = -1.0  # simulated time to end before [s]; -1: the bag's end
-    episodes: str = ""  # play only these, like 7 or 3-9
-    topics: str = ""  # play only these, comma-separated; empty: all
-    match: int = 0  # number of the match, from 1 on, where the bag has several; 0: the only one
-    as_recorded: bool = False  # play also what has another definition than the installed one
-    loop: bool = False  # begin again at the end
-    paused: bool = False  # wait for the services resume or step
-    start_delay: float = 0.5  # wall time between what is latched and the rest [s]
-    wait_for_subscribers: int = 0  # so many topics must be listened to before it begins
+    path: str = setting("", "folder of the bag")
+    rate: float = setting(
+        1.0, "simulated over wall time; 0: as fast as possible", "1", "[0, 10000]"
+    )
+    start: float = setting(
+        -1.0, "simulated time to begin at; -1: the bag's beginning", "s", "[-1, 1e9]"
+    )
+    end: float = setting(-1.0, "simulated time to end before; -1: the bag's end", "s", "[-1, 1e9]")
+    episodes: str = setting("", "play only these, like 7 or 3-9; empty: all")
+    topics: str = setting("", "play only these, comma-separated; empty: all")
+    match: int = setting(
+        0,
+        "number of the match, from 1 on, where the bag has several; 0: the only one",
+        "",
+        "[0, 1000000]",
+    )
+    as_recorded: bool = setting(
+        False, "play also what has another definition than the installed one"
+    )
+    loop: bool = setting(False, "begin again at the end")
+    paused: bool = setting(False, "wait for the services resume or step")
+    start_delay: float = setting(
+        0.5, "wall time between what is latched and the rest", "s", "[0, 3600]"
+    )
+    wait_for_subscribers: int = setting(
+        0, "begin when N topics have a subscriber", "topics", "[0, 1000]"
+    )
 
-    def __post_init__(self) -> None:
+    def __attrs_post_init__(self) -> None:
         if not self.path:
             raise KeepawayError("path is not set: name the bag that is to be played")
 
@@ -97,7 +112,7 @@ class Replayer(Node):
             KeepawayError: no bag, or not what is asked for.
         """
         super().__init__("replayer", **node_options)
-        self.settings = declared(self, Settings, changeable=("rate",))
+        self.settings = declare_settings(self, ReplayerSettings, ("rate",), self._on_settings)
         timeline = Timeline.of_bag(BagReader(self.settings.path), self.settings.match)
         topics = self._playable(timeline)
         self.playback = Playback(
@@ -112,7 +127,6 @@ class Replayer(Node):
         self._publishers_by_topic = {
             name: self._make_publisher(timeline.topics[name]) for name in topics
         }
-        self.add_on_set_parameters_callback(self._on_parameters)
         for name, action in (
             ("pause", self.playback.pause),
             ("resume", self.playback.resume),
@@ -191,14 +205,8 @@ class Replayer(Node):
             self._publishers_by_topic[message.topic].publish(message.data)
         return len(messages)
 
-    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == "rate":
-                try:
-                    self.playback.rate = float(parameter.value)
-                except (KeepawayError, TypeError) as error:
-                    return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _on_settings(self, settings: ReplayerSettings) -> None:
+        self.playback.rate = settings.rate
 
     def _service(
         self, action: Callable[[], None]

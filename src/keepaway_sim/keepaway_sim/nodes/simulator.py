@@ -11,20 +11,18 @@ import json
 import signal
 import time
 from collections.abc import Callable
-from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import attrs
 import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
@@ -36,16 +34,22 @@ from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
 from keepaway_sim.ros.diagnostics import diagnostics
 from keepaway_sim.ros.inbox import PROCESS_SIZE, Inbox
+from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE, MatchPublisher
-from keepaway_sim.ros.subscribing import declared
+from keepaway_sim.settings import same
 from keepaway_sim.task import Task
-from keepaway_sim.world.config import PROFILES, Config, profile
+from keepaway_sim.world.config import Config, Physics, Skills, Vision, profile
 from keepaway_sim.world.world import World
 
 HEALTH_PERIOD = 1.0  # [s]
 LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
-FIXED = ParameterDescriptor(read_only=True)
-ANY_TYPE = ParameterDescriptor(read_only=True, dynamic_typing=True)
+
+
+@attrs.frozen
+class _Profile:
+    """What the defaults of the world's constants depend on."""
+
+    profile: str = same(Config, "profile")
 
 
 class Simulator(Node):
@@ -65,7 +69,7 @@ class Simulator(Node):
             KeepawayError: parameters that make no match.
         """
         super().__init__("simulator", **node_options)
-        settings = declared(self, MatchSettings, CHANGEABLE)
+        settings = declare_settings(self, MatchSettings, CHANGEABLE, self._on_settings)
         task = Task.parse(settings.task, settings.field)
         world = World(task, self._declare_config())
         self._bag = self._open_bag(world, settings)
@@ -105,14 +109,14 @@ class Simulator(Node):
 
     def _declare_config(self) -> Config:
         """The world's constants: those of a profile, each of which is a parameter, too."""
-        name = str(self.declare_parameter("profile", "2005", ANY_TYPE).value)
-        default = profile(name) if name in PROFILES else profile()
-        changes = {
-            field.name: self.declare_parameter(field.name, getattr(group, field.name), FIXED).value
-            for group in (default.physics, default.vision, default.skills)
-            for field in fields(group)
-        }
-        return profile(name, **changes)
+        name = declare_settings(self, _Profile).profile
+        default = profile(name)
+        return Config(
+            name,
+            declare_settings(self, Physics, default=default.physics),
+            declare_settings(self, Vision, default=default.vision),
+            declare_settings(self, Skills, default=default.skills),
+        )
 
     def _open_bag(self, world: World, settings: MatchSettings) -> BagWriter | None:
         if not settings.record:
@@ -135,11 +139,10 @@ class Simulator(Node):
         self._inboxes.append(Inbox(self, Time, "recorded", self.conductor.take_recorded, ALL))
 
     def _offer(self) -> None:
-        """Services, changeable parameters, diagnostics."""
+        """Services and diagnostics."""
         conductor = self.conductor
         for action in (conductor.start, conductor.pause, conductor.reset):
             self.create_service(Trigger, action.__name__, partial(_on_trigger, action))
-        self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
         self.create_timer(HEALTH_PERIOD, self._publish_diagnostics)
 
@@ -149,13 +152,8 @@ class Simulator(Node):
     def _on_status(self, player: int, data: bytes, gid: bytes) -> None:
         self.conductor.take_status(player, data, gid[:PROCESS_SIZE])
 
-    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        given = {p.name: p.value for p in parameters if p.name in CHANGEABLE}
-        try:
-            self.conductor.settings = MatchSettings(**{**asdict(self.conductor.settings), **given})
-        except KeepawayError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _on_settings(self, settings: MatchSettings) -> None:
+        self.conductor.settings = settings
 
     def _publish_last_diagnostics(self) -> None:
         self._publish_diagnostics()

@@ -1,42 +1,15 @@
-"""What recorder, replayer and spectator share: parameters, and messages that pass as bytes."""
+"""What recorder, replayer and spectator share: messages that pass as bytes."""
 
 import importlib
-from collections.abc import Collection, Iterator
-from dataclasses import fields
-from typing import Any, TypeVar
+from collections.abc import Iterator
+from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from keepaway_sim.bags.topics import Qos
 from keepaway_sim.errors import KeepawayError
-
-Settings = TypeVar("Settings")
-
-
-def declared(node: Node, settings: type[Settings], changeable: Collection[str] = ()) -> Settings:
-    """Declare the fields of a dataclass as a node's parameters, and read them.
-
-    Args:
-        node: whose parameters.
-        settings: a dataclass with a default for every field.
-        changeable: those that may be set while the node runs.
-
-    Raises:
-        KeepawayError: whatever the dataclass refuses.
-    """
-    return settings(
-        **{
-            field.name: node.declare_parameter(
-                field.name,
-                field.default,
-                ParameterDescriptor(read_only=field.name not in changeable),
-            ).value
-            for field in fields(settings)  # type: ignore[arg-type]
-        }
-    )
 
 
 def message_class(message_type: str) -> type[Any]:

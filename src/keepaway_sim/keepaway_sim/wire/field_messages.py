@@ -110,7 +110,7 @@ class FieldMessages:
                 "field_length": task.field_length,
                 "field_width": task.field_width,
                 "cycle_time": CYCLE_TIME,
-                "visible_angle": float(np.radians(config.vision.visible_angle)),
+                "visible_angle": float(np.radians(config.vision.visible_angle_deg)),
                 "speed": speed,
                 "seed": seed,
                 "player_names": task.player_names,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections import namedtuple
 from typing import Any
 
 import numpy as np
 
+from keepaway_sim.settings import flat, settings_of
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import (
     ROLL_CYCLES,
@@ -23,16 +23,6 @@ from keepaway_sim.world.config import (
 )
 
 _GROUPS = (Task, Physics, Vision, Skills)
-_DEGREES = (
-    "visible_angle",
-    "direction_step",
-    "self_yaw_error",
-    "when_to_turn",
-    "mark_turn_angle",
-    "search_turn",
-)
-
-
 _DERIVED = (
     "kickable_distance",  # [m] between centres
     "touch_distance",  # [m] between centres
@@ -51,7 +41,7 @@ _DERIVED = (
 # Made once, under its own name in this module: numba's cache on disk must find it again.
 Constants: Any = namedtuple(  # type: ignore[misc]
     "Constants",
-    [entry.name for group in _GROUPS for entry in dataclasses.fields(group)] + list(_DERIVED),
+    [name.removesuffix("_deg") for kind in _GROUPS for name in settings_of(kind)] + list(_DERIVED),
 )
 
 
@@ -59,11 +49,9 @@ def pack(task: Task, config: Config) -> Any:
     """All constants as one named tuple that compiled functions take (angles in radians)."""
     values: dict[str, Any] = {}
     for group in (task, config.physics, config.vision, config.skills):
-        for entry in dataclasses.fields(group):
-            kind: Any = type(entry.default)  # one type per name, so that code is compiled once
-            values[entry.name] = kind(getattr(group, entry.name))
-    for name in _DEGREES:
-        values[name] = math.radians(values[name])
+        values |= flat(group)
+    for name in [name for name in values if name.endswith("_deg")]:
+        values[name.removesuffix("_deg")] = math.radians(values.pop(name))
     physics = config.physics
     values["touch_distance"] = physics.player_size + physics.ball_size
     values["kickable_distance"] = values["touch_distance"] + physics.kickable_margin

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from keepaway_agent.actions import Role
+from keepaway_agent.settings import changed
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import StopRule, TrainerConfig, TrialResult
 from keepaway_agent.training.trial import Trial as Run
@@ -191,9 +192,7 @@ def _config(study: Study, task: str, widths: str) -> TrainerConfig:
     return TrainerConfig(
         task=study.task(task),
         world=study.world_settings,
-        sarsa=study.sarsa,
-        ordering=study.ordering,
-        tile_widths=widths or study.widths,
+        learner=changed(study.learner_config, {"tile_widths": widths} if widths else {}),
         shared=study.shared_keepers,
     )
 

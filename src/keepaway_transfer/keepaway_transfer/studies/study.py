@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from keepaway_agent.learning.cmac import WIDTH_PROFILES
-from keepaway_agent.learning.sarsa import SarsaConfig
+from keepaway_agent.learning.config import LearnerConfig
+from keepaway_agent.settings import build
 from keepaway_sim.task import Task
 from keepaway_sim.world import config as world_config
 from keepaway_sim.world.config import Config
@@ -99,7 +100,7 @@ class Study:
     widths: str = "default"  # profile of tile widths
     learner: Mapping[str, float] = dataclasses.field(
         default_factory=dict
-    )  # of SarsaConfig, changed by name
+    )  # of LearnerConfig, changed by name
 
     def __post_init__(self) -> None:
         _check(self)
@@ -114,9 +115,10 @@ class Study:
         return world_config.profile(self.profile, **self.world)
 
     @property
-    def sarsa(self) -> SarsaConfig:
+    def learner_config(self) -> LearnerConfig:
         """How the keepers learn."""
-        return SarsaConfig(**self.learner)
+        ordering_and_tiles = {"ordering": self.ordering, "tile_widths": self.widths}
+        return build(LearnerConfig, {**ordering_and_tiles, **self.learner})
 
     def are_paired(self, first: Row, second: Row) -> bool:
         """Are these rows' trials of one number pairs: of one source run, or of one seed?"""
@@ -198,7 +200,10 @@ def _check(study: Study) -> None:
         raise StudyError(f"min_hours={study.min_hours}: give 0 to max_hours={study.max_hours}")
     if study.greedy_episodes < 0:
         raise StudyError(f"greedy_episodes={study.greedy_episodes}: give 0 or more")
-    _ = study.world_settings, study.sarsa  # refuse unknown names now, not in the first trial
+    _ = (
+        study.world_settings,
+        study.learner_config,
+    )  # refuse unknown names now, not in the first trial
 
 
 def _check_row(row: Row, study: Study) -> None:
