@@ -16,7 +16,7 @@ from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import load_weights
-from keepaway_agent.settings import changed
+from keepaway_agent.settings import build, changed
 from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import Progress
@@ -130,19 +130,19 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
         ({"task": "1v2"}, "num_keepers=1"),
         ({"profile": "1999"}, "profile='1999'"),
         ({"epsilon": 2.0}, "epsilon=2.0"),
-        ({"ordering": "size"}, "ordering 'size'"),
-        ({"tile_widths": "wide"}, "tile widths 'wide'"),
+        ({"ordering": "size"}, "ordering='size'"),
+        ({"tile_widths": "wide"}, "tile_widths='wide'"),
         ({"policy": "best"}, "keeper policy 'best'"),
         ({"taker_policy": "hold"}, "taker policy 'hold'"),
         ({"decision_interval": 0}, "interval=0"),
-        ({"episodes": 0}, "max_episodes=0"),
+        ({"episodes": 0}, "episodes=0"),
         ({"hours": -1.0}, "hours=-1.0"),
         ({"seed": -1}, "seed=-1"),
     ],
 )
 def test_settings_with_which_nothing_can_be_trained_are_refused(settings, words):
     with pytest.raises((AgentError, KeepawayError), match=words):
-        Training(**settings)
+        build(Training, settings)
 
 
 def test_weights_of_another_task_are_refused(tmp_path):

@@ -200,10 +200,7 @@ def _check(study: Study) -> None:
         raise StudyError(f"min_hours={study.min_hours}: give 0 to max_hours={study.max_hours}")
     if study.greedy_episodes < 0:
         raise StudyError(f"greedy_episodes={study.greedy_episodes}: give 0 or more")
-    _ = (
-        study.world_settings,
-        study.learner_config,
-    )  # refuse unknown names now, not in the first trial
+    _ = study.world_settings, study.learner_config  # refuse unknown names now
 
 
 def _check_row(row: Row, study: Study) -> None:
