@@ -108,7 +108,8 @@ def test_other_defaults_may_hold(make_node: MakeNode) -> None:
 
 
 def test_some_may_be_changed_while_the_node_runs(make_node: MakeNode) -> None:
-    node, seen = make_node({}), []
+    node = make_node({})
+    seen: list[Wish] = []
     declare_settings(node, Wish, ("speed", "share"), seen.append)
     done = node.set_parameters([Parameter("speed", value=4), Parameter("share", value=0.25)])
     assert all(each.successful for each in done)
@@ -128,7 +129,8 @@ def test_some_may_be_changed_while_the_node_runs(make_node: MakeNode) -> None:
 def test_changes_that_are_refused_change_nothing(
     make_node: MakeNode, name: str, value: Any, reason: str
 ) -> None:
-    node, seen = make_node({}), []
+    node = make_node({})
+    seen: list[Wish] = []
     declare_settings(node, Wish, ("speed", "share"), seen.append)
     (done,) = node.set_parameters([Parameter(name, value=value)])
     assert not done.successful
