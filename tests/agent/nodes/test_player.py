@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from graph import Graph, weights_of
-from rclpy.exceptions import InvalidParameterTypeException
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import load_weights, save_weights
@@ -125,7 +124,7 @@ def test_parameters_that_make_no_player_are_refused(
 
 
 def test_a_parameter_of_another_type_is_refused(graph: Graph) -> None:
-    with pytest.raises(InvalidParameterTypeException, match="alpha"):
+    with pytest.raises(AgentError, match="alpha='much': give a number from 0 to 1"):
         graph.start_player("keeper_1", alpha="much")
 
 

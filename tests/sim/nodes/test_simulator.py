@@ -213,7 +213,7 @@ def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:
         ({"speed": -1.0}, "speed=-1"),
         ({"seed": -1}, "seed=-1"),
         ({"answer_timeout": 0.0}, "answer_timeout=0"),
-        ({"visible_angle": 400.0}, "visible_angle=400"),
+        ({"visible_angle": 400.0}, "visible_angle_deg=400"),
         ({"ball_decay": 1.5}, "ball_decay=1.5"),
     ],
 )

@@ -145,5 +145,6 @@ class _Follower:
         return SetParametersResult(successful=True)
 
     def _after(self, parameters: list[Parameter]) -> None:
-        self._settings = changed(self._settings, self._own(parameters))
-        self._on_change(self._settings)
+        if own := self._own(parameters):  # it is called for what is declared later, too
+            self._settings = changed(self._settings, own)
+            self._on_change(self._settings)

@@ -89,7 +89,7 @@ def _draw_view(axes: Axes, at: np.ndarray, face: float, angle: float, colour: st
 
 
 def _draw_player(axes: Axes, at: np.ndarray, yaw: float, colour: str, label: str) -> None:
-    radius = 2 * Physics.player_size
+    radius = 2 * Physics().player_size
     x, y = at
     axes.add_patch(Circle((x, y), radius, fc=colour, ec=INK, lw=1.2, zorder=4))
     ahead = (x + radius * math.cos(yaw), y + radius * math.sin(yaw))

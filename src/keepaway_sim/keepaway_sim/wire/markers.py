@@ -42,12 +42,12 @@ def _border(task: Task) -> Marker:
 
 
 def _ball(x: float, y: float) -> Marker:
-    size = 4 * Physics.ball_size  # twice its true size, to be seen from above
+    size = 4 * Physics().ball_size  # twice its true size, to be seen from above
     return _marker("ball", 0, _SPHERE, (size, size, size), _WHITE, (x, y, size / 2))
 
 
 def _player(index: int, name: str, role: Role, x: float, y: float, yaw: float) -> list[Marker]:
-    wide, colour = 2 * Physics.player_size, _COLOURS[role]
+    wide, colour = 2 * Physics().player_size, _COLOURS[role]
     return [
         _marker("body", index, _CYLINDER, (wide, wide, _HEIGHT), colour, (x, y, _HEIGHT / 2)),
         _marker("direction", index, _ARROW, (1.0, 0.12, 0.12), colour, (x, y, _HEIGHT), yaw),
