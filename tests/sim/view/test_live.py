@@ -1,7 +1,10 @@
 """A live match in the browser: it is followed, and the server speaks to its own page only."""
 
+import contextlib
 import http.client
 import json
+import math
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -13,11 +16,13 @@ import pytest
 
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.errors import KeepawayError
 from keepaway_sim.view import live
 from keepaway_sim.view import server as serving
 from keepaway_sim.view.live import Event, LiveMatch
-from keepaway_sim.view.page import encoded, frames
+from keepaway_sim.view.page import encoded, frames, page
 from keepaway_sim.view.server import Server
+from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.messages import MATCH
 
 
@@ -132,6 +137,102 @@ def test_in_a_network_it_is_known_by_number_and_not_by_any_name() -> None:
         assert not server.may_be_named("192.168.1.7:1")
     finally:
         server.close()
+
+
+def test_a_browser_leaves_port_80_out_of_the_name(server: Server) -> None:
+    server.address = ("127.0.0.1", 80)
+    for name in ("localhost", "127.0.0.1", "localhost:80", "LocalHost"):
+        assert server.may_be_named(name)
+    for name in ("evil.example", "evil.example:80", "localhost:81", "", ":80"):
+        assert not server.may_be_named(name)
+    server.address = ("127.0.0.1", 8000)
+    assert not server.may_be_named("localhost")
+
+
+def connected(server: Server) -> socket.socket:
+    return socket.create_connection(server.address, timeout=30)
+
+
+def test_a_request_that_does_not_come_is_not_waited_for(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving, "REQUEST_TIMEOUT", 1.0)
+    with connected(server) as silent, connected(server) as slow:
+        ended = threading.Event()
+
+        def send_byte_by_byte() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    slow.send(b"G")
+                    ended.wait(0.05)
+
+        sender = threading.Thread(target=send_byte_by_byte, daemon=True)
+        sender.start()
+        assert silent.recv(1) == b""
+        with contextlib.suppress(ConnectionResetError):
+            assert slow.recv(1) == b""
+        ended.set()
+        sender.join()
+
+
+def test_connections_are_bounded_and_free_again(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving, "MAX_CONNECTIONS", 3)
+    threads = threading.active_count()
+    with contextlib.ExitStack() as stack:
+        held = [stack.enter_context(connected(server)) for _ in range(3)]
+        more = [stack.enter_context(connected(server)) for _ in range(20)]
+        for one in more:
+            with contextlib.suppress(ConnectionResetError):
+                assert one.recv(1) == b""
+        assert threading.active_count() <= threads + 3
+        for one in held:
+            one.send(f"GET / HTTP/1.0\r\nHost: 127.0.0.1:{server.address[1]}\r\n\r\n".encode())
+            assert one.recv(12) == b"HTTP/1.0 200"
+    while threading.active_count() > threads:
+        threading.Event().wait(0.01)
+    assert ask(server)[0] == 200
+
+
+def test_a_browser_that_takes_nothing_is_given_up(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving._Handler, "timeout", 1.0)
+    with connected(server) as deaf:
+        host = f"127.0.0.1:{server.address[1]}"
+        deaf.send(f"GET /events HTTP/1.0\r\nHost: {host}\r\n\r\n".encode())
+        while not server._browsers:
+            threading.Event().wait(0.01)
+        while server._browsers:
+            server._broadcast(("frame", json.dumps("x" * 100_000)))
+            threading.Event().wait(0.01)
+
+
+def test_what_a_match_says_is_text_in_a_page_and_no_markup() -> None:
+    hostile = "</script></title><img src=x onerror=alert(1)>\x1b[31m"
+    text = page({"live": False, "match": {"task": hostile, "facts": [hostile]}, "episodes": []})
+    assert "<img" not in text
+    assert "\x1b" not in text.partition("</title>")[2]
+
+
+def test_a_match_with_names_that_are_none_is_refused(bag_3v2: Path) -> None:
+    first = next(m for m in BagReader(bag_3v2).messages() if m.message_type == MATCH)
+    values = codec(MATCH).decode(first.data)
+    match = LiveMatch(lambda _: None)
+    for changes in (
+        {"player_names": ["<b>", *values["player_names"][1:]]},
+        {"player_names": ["keeper_1\x1b[31m", *values["player_names"][1:]]},
+        {"player_names": ["a" * 1000, *values["player_names"][1:]]},
+        {"player_names": values["player_names"] * 100},
+        {"visible_angle": math.nan},
+        {"num_keepers": 200},
+        {"field_length": math.inf},
+    ):
+        with pytest.raises(KeepawayError, match="makes no sense here"):
+            match.feed(MATCH, codec(MATCH).encode({**values, **changes}))
+    assert match.history == []
+    assert match.feed(MATCH, first.data) == values["player_names"]
 
 
 def test_nothing_else_is_there_and_nothing_can_be_sent(server: Server) -> None:

@@ -94,24 +94,28 @@ class LiveMatch:
             now = time.monotonic()
             if moment.state and (is_last or now - self._sent_at >= FRAME_PERIOD):
                 self._sent_at = now
-                self._send(("frame", json.dumps([key[0], encoded(self._frame(moment))])))
+                self._send(("frame", _json([key[0], encoded(self._frame(moment))])))
 
     def _begin(self, said: dict[str, Any]) -> list[str]:
         sides = said["field_length"], said["field_width"]
-        self._task = Task(said["num_keepers"], said["num_takers"], *sides)
-        self._moments.clear()
+        task = Task(said["num_keepers"], said["num_takers"], *sides)
+        names = list(said["player_names"])
+        if names != list(task.player_names):  # they become topics, and a page's text
+            raise ValueError(f"players {ascii(names)[:100]}, not {', '.join(task.player_names)}")
+        event = ("match", _json(match_data(said)))
         with self._lock:
-            self._match = ("match", json.dumps(match_data(said)))
+            self._task, self._match = task, event
+            self._moments.clear()
             self._episodes.clear()
-        self._send(self._match)
-        return list(said["player_names"])
+        self._send(event)
+        return names
 
     def _end_episode(self, said: dict[str, Any]) -> None:
         outcome = Outcome(said["outcome"])
         summary = EpisodeSummary(
             said["number"], 0, 0, said["cycles"], said["duration"], outcome, said["lost_by"]
         )
-        event = ("episode", json.dumps(episode_data(summary)))
+        event = ("episode", _json(episode_data(summary)))
         with self._lock:
             self._episodes.append(event)
             del self._episodes[:-KEPT_EPISODES]
@@ -149,6 +153,11 @@ class _Moment:
     outcome: int = Outcome.IN_PLAY
     seen: dict[int, bytes] = field(default_factory=dict)  # perceptions by player
     asked: dict[int, bytes] = field(default_factory=dict)  # requests by player
+
+
+def _json(data: Any) -> str:
+    """Data for a browser, on one line; ValueError where JSON has no word for a number (NaN)."""
+    return json.dumps(data, allow_nan=False)
 
 
 def _track(task: Task, moment: _Moment) -> Track:

@@ -6,7 +6,9 @@ import contextlib
 import ipaddress
 import queue
 import socket
+import sys
 import threading
+import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -15,10 +17,13 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.view.live import Event, LiveMatch
 from keepaway_sim.view.page import page
 
-MAX_BROWSERS = 16
+MAX_BROWSERS = 16  # that watch
+MAX_CONNECTIONS = 64  # at once, each with a thread; more are closed unread
 QUEUE_SIZE = 400  # events that a slow browser may be behind
 KEEP_ALIVE = 5.0  # [s] a sign of life, by which browsers that are gone are noticed
+REQUEST_TIMEOUT = 10.0  # [s] for all of a request to come, and for an event to be taken
 EVERYWHERE = "0.0.0.0"
+HTTP_PORT = 80  # browsers leave it out of a host's name
 
 
 class Server:
@@ -47,8 +52,7 @@ class Server:
         class Handler(_Handler):
             live = server
 
-        self._http = ThreadingHTTPServer((host, port), Handler)
-        self._http.daemon_threads = True
+        self._http = _HttpServer((host, port), Handler)
         self.address: tuple[str, int] = (host, self._http.server_port)
         self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
         self._thread.start()
@@ -70,13 +74,15 @@ class Server:
         A page of another site that got its own name resolved to this machine is refused by it;
         in a network the server is known by this machine's name or by its numbers.
         """
-        name, _, port = host.rpartition(":")
-        if port != str(self.address[1]):
+        own, own_port = self.address
+        if own_port == HTTP_PORT and not host.endswith(f":{HTTP_PORT}"):
+            host += f":{HTTP_PORT}"
+        name, _, port = host.lower().rpartition(":")
+        if port != str(own_port):
             return False
-        own = self.address[0]
         if name in ("127.0.0.1", "localhost", own):
             return True
-        return own == EVERYWHERE and (name == socket.gethostname() or _is_number(name))
+        return own == EVERYWHERE and (name == socket.gethostname().lower() or _is_number(name))
 
     @contextlib.contextmanager
     def browser(self) -> Iterator[queue.Queue[Event]]:
@@ -100,7 +106,8 @@ class Server:
         with self._lock:
             for events in self._browsers:
                 if event[0] == "match":  # whatever was before it is over
-                    events.queue.clear()
+                    with events.mutex:
+                        events.queue.clear()
                 with contextlib.suppress(queue.Full):
                     events.put_nowait(event)
 
@@ -113,14 +120,67 @@ def _is_number(name: str) -> bool:
     return True
 
 
+class _HttpServer(ThreadingHTTPServer):
+    """A thread for each connection, but for so many only, and none for long without a request."""
+
+    daemon_threads = True
+    request_queue_size = MAX_CONNECTIONS
+
+    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
+        self._lock = threading.Lock()
+        self._asking: dict[socket.socket, float] = {}  # connections: when they came [s]
+        self._open: set[socket.socket] = set()
+        super().__init__(address, handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Let a thread answer, if there are not too many."""
+        with self._lock:
+            if is_free := len(self._open) < MAX_CONNECTIONS:
+                self._open.add(request)
+                self._asking[request] = time.monotonic()
+        if is_free:
+            super().process_request(request, client_address)
+        else:
+            super().shutdown_request(request)
+
+    def has_asked(self, request: Any) -> None:
+        """A request has come whole."""
+        with self._lock:
+            self._asking.pop(request, None)
+
+    def shutdown_request(self, request: Any) -> None:
+        """A connection has ended."""
+        with self._lock:
+            self._open.discard(request)
+            self._asking.pop(request, None)
+        super().shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """Several times a second: end connections whose request does not come, byte by byte."""
+        latest = time.monotonic() - REQUEST_TIMEOUT
+        with self._lock:
+            for request in [each for each, came in self._asking.items() if came < latest]:
+                del self._asking[request]
+                with contextlib.suppress(OSError):
+                    request.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and closes it
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that has gone; anything else is an error of ours."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
 class _Handler(BaseHTTPRequestHandler):
     """Answers one browser's requests."""
 
     live: Server
+    server: _HttpServer
     server_version, sys_version = "keepaway", ""
+    timeout = REQUEST_TIMEOUT
 
     def do_GET(self) -> None:
         """The page, or its events."""
+        self.server.has_asked(self.connection)
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         if not self.live.may_be_named(host) or origin not in (None, f"http://{host}"):
             self.send_error(403, "This page is for its own machine's browsers")
@@ -166,7 +226,7 @@ class _Handler(BaseHTTPRequestHandler):
                         self.wfile.write(b": still here\n\n")
         except KeepawayError as error:
             self.send_error(503, str(error))
-        except (BrokenPipeError, ConnectionError):
+        except OSError:  # it is gone, or has taken nothing for REQUEST_TIMEOUT
             return
 
     def _send_event(self, event: Event) -> None:
