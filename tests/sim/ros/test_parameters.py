@@ -102,6 +102,23 @@ def test_absurd_values_are_refused_with_what_may_be_given(
         declare_settings(make_node(given), Wish)
 
 
+@attrs.frozen
+class Needy:
+    """Settings that do without no value."""
+
+    path: str = setting("", "of a file")
+
+    def __attrs_post_init__(self) -> None:
+        if not self.path:
+            raise SettingError("path is not set")
+
+
+def test_settings_may_have_no_default_that_holds(make_node: MakeNode) -> None:
+    assert declare_settings(make_node({"path": "a"}), Needy) == Needy("a")
+    with pytest.raises(SettingError, match="path is not set"):
+        declare_settings(make_node({}), Needy)
+
+
 def test_other_defaults_may_hold(make_node: MakeNode) -> None:
     node = make_node({"count": 5})
     assert declare_settings(node, Wish, default=Wish(speed=7.0)) == Wish(speed=7.0, count=5)

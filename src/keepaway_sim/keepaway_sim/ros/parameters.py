@@ -58,9 +58,9 @@ def declare_settings(
     Raises:
         SettingError: a value that is refused.
     """
-    before = flat(settings() if default is None else default)
+    before = {} if default is None else flat(default)
     values = {
-        name: _declare(node, declared, before[name], name not in changeable)
+        name: _declare(node, declared, before.get(name, declared.default), name not in changeable)
         for name, declared in settings_of(settings).items()
     }
     made = build(settings, values)
