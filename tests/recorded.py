@@ -14,7 +14,7 @@ from keepaway_sim.bags.field_recorder import FieldRecorder, world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.world.config import CYCLE_TIME, Config, profile
-from keepaway_sim.world.state import Perceptions
+from keepaway_sim.world.state import Belief
 from keepaway_sim.world.world import World
 
 
@@ -25,11 +25,11 @@ def record_match(path: Path, task: str, seed: int, episodes: int) -> Path:
     with BagWriter(path, world_info(world, seed), flush_interval=math.inf) as bag:
         recorder = FieldRecorder(bag, world, 0, seed)
         recorder.moment()
-        while world.perceptions.episode[0] < episodes:
-            action, target, values = simple_requests(world.perceptions, world.task)
+        while world.belief.episode[0] < episodes:
+            action, target, values = simple_requests(world.belief, world.task)
             recorder.requests(action, target, values)
             world.step(action[None], target[None])
-            if world.perceptions.episode[0] < episodes:
+            if world.belief.episode[0] < episodes:
                 recorder.moment()
     return path
 
@@ -55,21 +55,21 @@ def record_agents(
     with BagWriter(path, world_info(world, seed, agents=json.dumps(agents))) as bag:
         recorder = FieldRecorder(bag, world, 0, seed)
         recorder.moment()
-        while world.perceptions.episode[0] < episodes:
+        while world.belief.episode[0] < episodes:
             decisions = [
-                player.perceive(perceived(world.perceptions, index))
+                player.perceive(perceived(world.belief, index))
                 for index, player in enumerate(players)
             ]
             action = np.array([d.action if d else 0 for d in decisions])
             target = np.array([d.target if d else 0 for d in decisions])
             recorder.requests(action, target, [d.values.tolist() if d else () for d in decisions])
             world.step(action[None], target[None])
-            if world.perceptions.episode[0] < episodes:
+            if world.belief.episode[0] < episodes:
                 recorder.moment()
     return path
 
 
-def perceived(seen: Perceptions, player: int) -> Perceived:
+def perceived(seen: Belief, player: int) -> Perceived:
     """What a player of field 0 perceives, as its agent wants it."""
     return Perceived(
         int(seen.episode[0]),
@@ -85,9 +85,7 @@ def perceived(seen: Perceptions, player: int) -> Perceived:
     )
 
 
-def simple_requests(
-    seen: Perceptions, task: Task
-) -> tuple[np.ndarray, np.ndarray, list[list[float]]]:
+def simple_requests(seen: Belief, task: Task) -> tuple[np.ndarray, np.ndarray, list[list[float]]]:
     """What players of field 0 ask for: with the ball they pass to the next keeper, now and then."""
     num, keepers = task.num_players, task.num_keepers
     action = np.full(num, Action.GO_TO_BALL)
@@ -107,4 +105,4 @@ def simple_requests(
 
 def in_play(world: World) -> bool:
     """Whether field 0's episode goes on."""
-    return bool(world.perceptions.outcome[0] == Outcome.IN_PLAY)
+    return bool(world.belief.outcome[0] == Outcome.IN_PLAY)

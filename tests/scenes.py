@@ -5,15 +5,19 @@ test says otherwise; x goes to the right, y up. Everybody faces +x and is at res
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
 from keepaway_sim.task import Task
-from keepaway_sim.world import sight, state
+from keepaway_sim.world import sight
+from keepaway_sim.world.bodies import Bodies
 from keepaway_sim.world.config import NEVER, Config, noiseless, profile
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.skills import kicking, tactics
-from keepaway_sim.world.skills.prediction import cycles_to_ball
+from keepaway_sim.world.skills.prediction import ball_of, body_of, cycles_to_ball
+from keepaway_sim.world.state import Command, Fields, make_fields
+from keepaway_sim.world.streams import Draws
 
 EXACT = noiseless(profile("2005"))  # every noise and rounding off
 
@@ -24,10 +28,8 @@ class Scene:
     Players that are not drawn stand at (-5, -12), for whoever looks.
 
     Attributes:
-        c: constants.
-        s: what players believe (`vision.Perceptions`).
-        m: what they remember (`vision.Memory`).
-        speech: what they say.
+        w: the record of its one field.
+        belief, memory, speech: of `w`.
         position, velocity, yaw: the truth, (P + 1, 2), (P + 1, 2), (P,).
     """
 
@@ -41,17 +43,29 @@ class Scene:
         places = _places(drawing, *corner)
         keepers = max([2, *(int(name) for name in places if name.isdigit())])
         takers = max([1, *(ord(name) - 96 for name in places if name in "abcdefghijk")])
-        self.c = pack(Task(keepers, takers, field, field), config)
+        task = Task(keepers, takers, field, field)
         self.num_keepers, self.ball = keepers, keepers + takers
-        self.s = state.make_perceptions(1, self.ball)
-        self.m = state.make_memory(self.c, 1)
-        self.speech = state.make_speech(1, self.ball)
-        self.position = np.tile([-5.0, -12.0], (self.ball + 1, 1))
-        self.velocity = np.zeros((self.ball + 1, 2))
-        self.yaw = np.zeros(self.ball)
+        self.w = make_record(task, config)
+        self.belief, self.memory, self.speech = self.w.belief, self.w.memory, self.w.speech
+        truth = self.w.truth
+        self.position, self.velocity, self.yaw = truth.position[0], truth.velocity[0], truth.yaw[0]
+        self.position[:] = -5.0, -12.0
         for name, (x, y) in places.items():
             self.put(name, x, y)
-            self.s.age[0, :, self.index(name)] = 0
+            self.belief.age[0, :, self.index(name)] = 0
+
+    @property
+    def c(self) -> Any:
+        """The constants."""
+        return self.w.constants
+
+    def change(self, **constants: float) -> None:
+        """Play on with other constants."""
+        self.w = self.w._replace(constants=self.c._replace(**constants))
+
+    def draw(self, *uniforms: float) -> None:
+        """Let these be the next random numbers."""
+        self.w = self.w._replace(random=draws(*uniforms))
 
     def index(self, name: str) -> int:
         """The object's number, in match order."""
@@ -76,58 +90,60 @@ class Scene:
 
     def believe(self) -> None:
         """All players believe the truth (of whom they know) and what follows from it."""
-        self.s.position[0], self.s.velocity[0], self.s.body[0] = (
+        self.belief.position[0], self.belief.velocity[0], self.belief.body[0] = (
             self.position,
             self.velocity,
             self.yaw,
         )
         away = np.linalg.norm(self.position[:-1] - self.position[-1], axis=1)
-        self.s.ball_kickable[0] = away < self.c.kickable_distance
+        self.belief.ball_kickable[0] = away < self.c.kickable_distance
 
     def lose(self, name: str, age: int = NEVER) -> None:
         """Let everybody have seen an object `age` cycles ago for the last time."""
-        self.s.age[0, :, self.index(name)] = age
+        self.belief.age[0, :, self.index(name)] = age
 
     def predict_meetings(self, name: str) -> None:
         """Let a player work out how soon each known team-mate reaches the ball."""
         p = self.index(name)
         for j in range(self.num_keepers):
-            if self.s.age[0, p, j] < NEVER:
-                self.s.cycles_to_ball[0, p, j] = cycles_to_ball(
-                    self.c,
-                    *self.position[j],
-                    *self.velocity[j],
-                    math.cos(self.yaw[j]),
-                    math.sin(self.yaw[j]),
-                    self.position[-1],
-                    self.velocity[-1],
-                    2 * self.c.intercept_horizon - 1,
-                )
+            if self.belief.age[0, p, j] < NEVER:
+                limit = 2 * self.c.intercept_horizon - 1
+                body, ball = body_of(self.w, 0, p, j), ball_of(self.w, 0, p)
+                self.belief.cycles_to_ball[0, p, j] = cycles_to_ball(self.c, body, ball, limit)
 
     def command(self, name: str, action: int, target: str = "1") -> tuple[float, float, float]:
         """A player's command: kind, power, angle [deg]."""
         p, aim = self.index(name), self.index(target)
-        kind, power, angle = tactics.command(self.c, self.s, self.m, 0, p, int(action), aim)
+        kind, power, angle = tactics.command(self.w, 0, p, int(action), aim)
         return kind, power, math.degrees(angle)
 
     def ball_after(self, name: str, command: tuple[float, float, float]) -> np.ndarray:
         """Where the ball is a cycle after a player's command (kind, power, degrees)."""
         kind, power, angle = command
         p = self.index(name)
-        return np.array(kicking.ball_after(self.c, self.s, 0, p, kind, power, math.radians(angle)))
+        return np.array(kicking.ball_after(self.w, 0, p, Command(kind, power, math.radians(angle))))
 
     def look(self, name: str, *uniforms: float) -> None:
         """Let a player see the truth; `uniforms` are the random numbers that it takes."""
-        block = np.array([[*uniforms, *[math.nan] * 64]])
-        cursor = np.zeros(1, dtype=np.int64)
-        truth = self.position, self.velocity, self.yaw
-        sight.look(self.c, self.s, self.m, *truth, 0, self.index(name), block, cursor)
-        assert cursor[0] == len(uniforms)
+        self.draw(*uniforms)
+        sight.look(self.w, 0, self.index(name))
+        assert self.w.random.cursor[0] == len(uniforms)
 
     def seen(self, name: str, what: str) -> np.ndarray:
         """Where a player believes an object to be, as seen from itself."""
-        belief = self.s.position[0, self.index(name)]
-        return np.asarray(belief[self.index(what)] - belief[self.index(name)])
+        believed = self.belief.position[0, self.index(name)]
+        return np.asarray(believed[self.index(what)] - believed[self.index(name)])
+
+
+def draws(*uniforms: float) -> Draws:
+    """One stream of random numbers: these, and none after them."""
+    return Draws(np.array([[*uniforms, *[math.nan] * 64]]), np.zeros(1, dtype=np.int64))
+
+
+def make_record(task: Task, config: Config) -> Fields:
+    """One field on which nothing has begun."""
+    bodies = Bodies(1, np.full(task.num_players + 1, 0.3), max(task.field_length, task.field_width))
+    return make_fields(pack(task, config), bodies.discs, draws())
 
 
 def _places(drawing: str, left: float, bottom: float) -> dict[str, tuple[float, float]]:

@@ -233,7 +233,7 @@ def bags(folder: Path) -> list[bytes]:
         recorder = FieldRecorder(bag, world, 0, 1)
         for _ in range(6):
             recorder.moment()
-            world.step(world.state.action, world.state.target)
+            world.step(world.truth.action, world.truth.target)
         bag.flush()
         made.append(folder.joinpath(compression, f"{compression}_0.mcap").read_bytes())
         bag.close()
@@ -318,7 +318,7 @@ def perceptions(world: World) -> list[bytes]:
     """What keeper_1 is sent: in play, with the ball, at the end of an episode."""
     sent = FieldMessages(world)
     made = [sent.perceptions()[0]]
-    for changed in (world.perceptions.ball_kickable, world.perceptions.outcome):
+    for changed in (world.belief.ball_kickable, world.belief.outcome):
         changed[0] = 1
         made.append(sent.perceptions()[0])
     begin_match(world, 1)
@@ -415,8 +415,8 @@ def make_world(data: bytes) -> object:
     }
     world = World(Task.parse("2v1"), profile("2005", **given))
     begin_match(world, 1)
-    world.step(world.state.action, world.state.target)
-    assert np.isfinite(world.state.position).all()
+    world.step(world.truth.action, world.truth.target)
+    assert np.isfinite(world.truth.position).all()
     return world
 
 

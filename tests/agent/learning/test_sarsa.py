@@ -1,6 +1,7 @@
 """SMDP Sarsa(lambda): by hand, and what batches must not change."""
 
 import itertools
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ def learner(lambda_=0.0, alpha=0.5, **settings):
 
 def values(learners, x):
     """Values of both actions at x, without disturbing the learner."""
-    copy = sarsa.Learners(*(array.copy() for array in learners))
+    copy = deepcopy(learners)
     copy.state[0, 0] = x
     sarsa.look(copy, 0)
     return copy.values[0].tolist()

@@ -79,7 +79,7 @@ def play_one_by_one(seed, policy, num_episodes, learner=LEARNER):
     action = np.zeros((1, task.num_players), dtype=np.int64)
     target = np.zeros_like(action)
     durations: list[int] = []
-    seen = world.perceptions
+    seen = world.belief
     while len(durations) < num_episodes:
         for p, agent in enumerate(agents):
             view = View(

@@ -50,10 +50,10 @@ def test_a_track_is_what_the_world_was(bag_3v2: Path) -> None:
         track = match.track(episode)
         assert len(track.time) == episode.cycles + 1
         for t in range(episode.cycles + 1):
-            seen = world.perceptions
-            np.testing.assert_array_equal(track.position[t], world.state.position[0])
-            np.testing.assert_array_equal(track.velocity[t], world.state.velocity[0] / CYCLE_TIME)
-            np.testing.assert_array_equal(track.yaw[t], world.state.yaw[0])
+            seen = world.belief
+            np.testing.assert_array_equal(track.position[t], world.truth.position[0])
+            np.testing.assert_array_equal(track.velocity[t], world.truth.velocity[0] / CYCLE_TIME)
+            np.testing.assert_array_equal(track.yaw[t], world.truth.yaw[0])
             np.testing.assert_array_equal(track.believed[t], seen.position[0])
             np.testing.assert_array_equal(track.age[t], seen.age[0])
             action, target, values = simple_requests(seen, world.task)
@@ -74,8 +74,8 @@ def test_chosen_episodes_of_a_chosen_field_are_recorded(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag", world_info(world, 2)) as bag:
         recorder = FieldRecorder(bag, world, 2, seed=2, wanted=lambda number: number in (1, 3))
         recorder.moment()
-        while world.perceptions.episode[2] < 4:
-            action, target, _ = simple_requests(world.perceptions, world.task)
+        while world.belief.episode[2] < 4:
+            action, target, _ = simple_requests(world.belief, world.task)
             recorder.requests(action, target)
             world.step(np.tile(action, (3, 1)), np.tile(target, (3, 1)))
             recorder.moment()
@@ -136,7 +136,7 @@ def test_the_world_goes_on_while_it_is_recorded(bag_3v2: Path) -> None:
     world.start(0, SEED)
     cycles = 0
     while in_play(world):
-        action, target, _ = simple_requests(world.perceptions, world.task)
+        action, target, _ = simple_requests(world.belief, world.task)
         world.step(action[None], target[None])
         cycles += 1
     assert next(MatchBag(bag_3v2).episodes()).cycles == cycles

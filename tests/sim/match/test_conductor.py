@@ -129,7 +129,7 @@ def played_alone(episodes: int, seed: int) -> list[tuple[int, int]]:
     begin_match(world, seed)
     action = np.array([[plain_answer(player) for player in range(TASK.num_players)]])
     while len(found) < episodes:
-        seen = world.perceptions
+        seen = world.belief
         if seen.outcome[0] != Outcome.IN_PLAY:
             found.append((int(seen.cycle[0]), int(seen.outcome[0])))
         world.step(action.astype(np.int64), np.zeros_like(action, dtype=np.int64))

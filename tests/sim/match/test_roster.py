@@ -76,7 +76,7 @@ def test_an_answer_that_comes_twice_counts_once_and_the_first_one_counts(roster)
 def test_without_answers_keepers_get_open_and_takers_go_to_the_ball(world, roster):
     action, _ = roster.requests()
     assert action.tolist() == [[Action.GET_OPEN] * 3 + [Action.GO_TO_BALL] * 2]
-    world.perceptions.ball_kickable[0, KEEPER] = True
+    world.belief.ball_kickable[0, KEEPER] = True
     roster.begin(world, now=0.0)
     assert roster.requests()[0][0, KEEPER] == Action.HOLD_BALL
     assert [seat.missed for seat in roster.seats] == [2, 2, 2, 2, 2]
@@ -118,7 +118,7 @@ def test_a_late_answer_holds_until_a_better_one_comes(world, roster):
 
 
 def test_who_is_always_late_is_not_missing(world, roster):
-    seen = world.perceptions
+    seen = world.belief
     for cycle in range(1, 50):
         before = int(seen.episode[0]), int(seen.cycle[0])
         next_cycle(world, roster, now=0.1 * cycle)
@@ -136,7 +136,7 @@ def test_requests_of_an_earlier_episode_are_not_played(world, roster):
 
 def test_the_end_of_an_episode_needs_no_answer(world, roster):
     world.abort(0)
-    assert world.perceptions.outcome[0] == Outcome.ABORTED
+    assert world.belief.outcome[0] == Outcome.ABORTED
     roster.begin(world, now=0.1)
     assert roster.num_awaited == 0
 

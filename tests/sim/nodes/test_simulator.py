@@ -152,7 +152,7 @@ def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain:
     said: set[tuple[int, int]] = set()
 
     def meddle() -> None:
-        seen = simulator.conductor.world.perceptions
+        seen = simulator.conductor.world.belief
         moment = int(seen.episode[0]), int(seen.cycle[0])
         if moment in said:
             return

@@ -38,10 +38,10 @@ def play(name: str) -> list[list[float]]:
     world.start(0, np.random.SeedSequence(1))
     rows = []
     for cycle in range(1, CYCLES + 1):
-        action, target, _ = simple_requests(world.perceptions, task)
+        action, target, _ = simple_requests(world.belief, task)
         world.step(action[None], target[None])
         if cycle % EVERY == 0:
-            rows.append(world.state.position[0].ravel().round(6).tolist())
+            rows.append(world.truth.position[0].ravel().round(6).tolist())
     return rows
 
 

@@ -70,7 +70,7 @@ def test_changes_of_distance_and_direction_are_rounded(moving, expected):
     scene.put("2", 10.0, 0.0)
     scene.move("2", *moving)
     scene.look("1")
-    assert scene.s.velocity[0, 0, 1] == approx(expected, abs=1e-5)
+    assert scene.belief.velocity[0, 0, 1] == approx(expected, abs=1e-5)
 
 
 def test_velocities_are_those_over_ground():
@@ -79,69 +79,69 @@ def test_velocities_are_those_over_ground():
     scene.move("o", -1.0, 0.5)
     scene.move("a", 0.0, 0.4)
     truth = scene.velocity.copy()
-    scene.s.velocity[:] = 0.0
+    scene.belief.velocity[:] = 0.0
     scene.look("1")
-    assert scene.s.velocity[0, 0, 1:] == approx(truth[1:])  # the own one is felt, not seen
+    assert scene.belief.velocity[0, 0, 1:] == approx(truth[1:])  # the own one is felt, not seen
 
 
 def test_without_noise_a_player_sees_the_truth():
     scene = Scene(WIDE)
     for number, name in enumerate("12a"):
         scene.face(name, 40.0 * number)
-    scene.s.position[0, 0, 1:] = 55.0
-    scene.s.body[0, 0] = 0.0
-    scene.s.age[:] = NEVER
+    scene.belief.position[0, 0, 1:] = 55.0
+    scene.belief.body[0, 0] = 0.0
+    scene.belief.age[:] = NEVER
     scene.look("1")
-    assert scene.s.position[0, 0] == approx(scene.position)
-    assert scene.s.body[0, 0] == approx(scene.yaw)
-    assert not scene.s.age[0, 0, 1:].any()
+    assert scene.belief.position[0, 0] == approx(scene.position)
+    assert scene.belief.body[0, 0] == approx(scene.yaw)
+    assert not scene.belief.age[0, 0, 1:].any()
 
 
 def test_a_narrow_view_is_a_cone_about_the_face():
     scene = Scene(WIDE, NARROW)  # a lies at 26.6 degrees, o straight ahead, 2 at -158
-    scene.s.age[:] = 5
+    scene.belief.age[:] = 5
     scene.look("1")
-    assert scene.s.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 0]
-    scene.s.age[:] = 5
+    assert scene.belief.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 0]
+    scene.belief.age[:] = 5
     scene.face("1", 75.0)
-    scene.s.neck[0, 0] = math.radians(-10.0)  # faces 65: within 45 degrees of a, not of o
+    scene.belief.neck[0, 0] = math.radians(-10.0)  # faces 65: within 45 degrees of a, not of o
     scene.look("1")
-    assert scene.s.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 5]
+    assert scene.belief.age[0, 0, [1, 2, 3]].tolist() == [5, 0, 5]
 
 
 def test_a_full_view_sees_behind():
     scene = Scene(WIDE)
     scene.face("1", 180.0)
-    scene.s.age[:] = 5
+    scene.belief.age[:] = 5
     scene.look("1")
-    assert not scene.s.age[0, 0, 1:].any()
+    assert not scene.belief.age[0, 0, 1:].any()
 
 
 def test_what_lies_behind_is_felt_within_three_metres():
     scene = Scene("o . . 1", NARROW)
     for x, age in ((0.1, 0), (-0.1, 5)):
         scene.put("o", x, 0.0)
-        scene.s.age[:] = 5
+        scene.belief.age[:] = 5
         scene.look("1")
-        assert scene.s.age[0, 0, scene.ball] == age
+        assert scene.belief.age[0, 0, scene.ball] == age
 
 
 @pytest.mark.parametrize(("age", "felt"), [(12, True), (13, False)])
 def test_who_is_felt_has_no_name_unless_somebody_is_expected_there(age, felt):
     scene = Scene("a . 1", NARROW)
-    scene.s.age[0, 0, scene.index("a")] = age
+    scene.belief.age[0, 0, scene.index("a")] = age
     scene.look("1")
-    assert (scene.s.age[0, 0, scene.index("a")] == 0) == felt
+    assert (scene.belief.age[0, 0, scene.index("a")] == 0) == felt
 
 
 @pytest.mark.parametrize(("believed", "known"), [((5.0, 3.4), False), ((5.0, 3.6), True)])
 def test_who_is_not_where_it_must_be_seen_is_not_known_any_more(believed, known):
     # at 34 and 36 degrees: inside the cone of 45 to each side by more and by less than 10
     scene = Scene("1", NARROW)
-    scene.s.age[0, 0, scene.index("a")] = 2
-    scene.s.position[0, 0, scene.index("a")] = believed
+    scene.belief.age[0, 0, scene.index("a")] = 2
+    scene.belief.position[0, 0, scene.index("a")] = believed
     scene.look("1")
-    assert (scene.s.age[0, 0, scene.index("a")] == 2) == known
+    assert (scene.belief.age[0, 0, scene.index("a")] == 2) == known
 
 
 @pytest.mark.parametrize(
@@ -157,12 +157,12 @@ def test_who_is_not_where_it_must_be_seen_is_not_known_any_more(believed, known)
 )
 def test_far_objects_show_less_often_how_they_move(distance, draws, velocity):
     scene = Scene("1 o", field=90.0)
-    scene.c = scene.c._replace(certain_distance=20.0)
+    scene.change(certain_distance=20.0)
     scene.put("o", distance, 0.0)
     scene.move("o", 0.5, 0.0)
-    scene.s.velocity[0, 0, scene.ball] = 0.1, 0.0
+    scene.belief.velocity[0, 0, scene.ball] = 0.1, 0.0
     scene.look("1", *draws)
-    assert scene.s.velocity[0, 0, scene.ball, 0] == approx(velocity)
+    assert scene.belief.velocity[0, 0, scene.ball, 0] == approx(velocity)
 
 
 @pytest.mark.parametrize(
@@ -172,9 +172,9 @@ def test_far_objects_show_less_often_how_they_move(distance, draws, velocity):
 def test_a_ball_that_rolls_as_expected_is_believed_half_way(seen, believed):
     scene = Scene("1 . . . . o")
     scene.move("o", seen, 0.0)
-    scene.s.velocity[0, 0, scene.ball] = 1.0, 0.0
+    scene.belief.velocity[0, 0, scene.ball] = 1.0, 0.0
     scene.look("1")
-    assert scene.s.velocity[0, 0, scene.ball] == approx([believed, 0.0])
+    assert scene.belief.velocity[0, 0, scene.ball] == approx([believed, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -186,40 +186,46 @@ def test_a_ball_within_an_opponents_reach_is_believed_to_lie_still(taker, veloci
     scene.put("a", taker, 0.0)
     scene.move("o", 0.3, 0.0)
     scene.look("1")
-    assert scene.s.velocity[0, 0, scene.ball] == approx([velocity, 0.0])
+    assert scene.belief.velocity[0, 0, scene.ball] == approx([velocity, 0.0])
 
 
 def test_the_error_of_the_own_position_moves_everything_seen():
     scene = Scene("1 . . . . o", noiseless(profile("2005")))
-    scene.c = scene.c._replace(self_position_error=0.15)
+    scene.change(self_position_error=0.15)
     scene.look("1", 1.0, 0.25)  # +0.15 along x, -0.075 along y
-    assert scene.s.position[0, 0, 0] == approx([0.15, -0.075])
-    assert scene.s.position[0, 0, scene.ball] == approx([5.15, -0.075])
+    assert scene.belief.position[0, 0, 0] == approx([0.15, -0.075])
+    assert scene.belief.position[0, 0, scene.ball] == approx([5.15, -0.075])
 
 
 def test_the_error_of_the_own_direction_turns_everything_seen():
     scene = Scene("1 . . . . o")
-    scene.c = scene.c._replace(self_yaw_error=math.radians(0.3))
+    scene.change(self_yaw_error=math.radians(0.3))
     scene.look("1", 0.0)
-    assert math.degrees(scene.s.body[0, 0, 0]) == approx(-0.3)
+    assert math.degrees(scene.belief.body[0, 0, 0]) == approx(-0.3)
     assert scene.seen("1", "o") == approx(
         [5 * math.cos(math.radians(0.3)), -5 * math.sin(math.radians(0.3))]
     )
 
 
+def looks_at(scene: Scene, time: int) -> bool:
+    """Does the first player see something new at a time of its field's life?"""
+    scene.w.truth.time[0] = time
+    return bool(sight.looks_now(scene.w, 0, 0))
+
+
 def test_two_of_three_cycles_bring_something_new():
     scene = Scene("1 2")
     for phase in range(3):
-        scene.m.look_phase[0, 0] = phase
-        looks = [sight.looks_now(scene.c, scene.m, 0, 0, time) for time in range(9)]
+        scene.memory.look_phase[0, 0] = phase
+        looks = [looks_at(scene, time) for time in range(9)]
         assert sum(looks) == 6
         assert looks[:3] == looks[3:6] == looks[6:]
 
 
 def test_with_a_period_of_one_every_cycle_brings_something_new():
     scene = Scene("1 2")
-    scene.c = scene.c._replace(look_period=1)
-    assert all(sight.looks_now(scene.c, scene.m, 0, 0, time) for time in range(9))
+    scene.change(look_period=1)
+    assert all(looks_at(scene, time) for time in range(9))
 
 
 def test_what_is_not_seen_rolls_on_and_ages():
@@ -227,20 +233,20 @@ def test_what_is_not_seen_rolls_on_and_ages():
     scene.lose("a")
     scene.move("2", 0.4, 0.0)
     scene.move("o", 1.0, -0.5)
-    scene.s.age[0, 0, 1] = 3
-    memory.remember(scene.c, scene.s, scene.m, 0, 0)
-    s = scene.s
-    assert s.position[0, 0, 1] == approx([1.4, 0.0])
-    assert s.velocity[0, 0, 1] == approx([0.16, 0.0])  # player_decay 0.4
-    assert s.position[0, 0, scene.ball] == approx([12.0, 1.5])
-    assert s.velocity[0, 0, scene.ball] == approx([0.94, -0.47])
-    assert s.age[0, 0].tolist() == [1, 4, NEVER, 1]
+    scene.belief.age[0, 0, 1] = 3
+    memory.remember(scene.w, 0, 0)
+    belief = scene.belief
+    assert belief.position[0, 0, 1] == approx([1.4, 0.0])
+    assert belief.velocity[0, 0, 1] == approx([0.16, 0.0])  # player_decay 0.4
+    assert belief.position[0, 0, scene.ball] == approx([12.0, 1.5])
+    assert belief.velocity[0, 0, scene.ball] == approx([0.94, -0.47])
+    assert belief.age[0, 0].tolist() == [1, 4, NEVER, 1]
 
 
 def test_the_opponent_nearest_to_the_ball_is_believed_to_come_for_it():
     scene = Scene("a . . . 1 . . . o . . . . . b")  # a is 8 m, b 6 m from the ball
     scene.move("a", 0.4, 0.0)
-    memory.remember(scene.c, scene.s, scene.m, 0, 0)
+    memory.remember(scene.w, 0, 0)
     assert scene.seen("1", "b") == approx([10.0 - 0.3, 0.0])
     assert scene.seen("1", "a") == approx([-4.0 + 0.4, 0.0])
 
@@ -249,49 +255,49 @@ def test_an_own_kick_is_part_of_what_is_expected():
     scene = Scene("1 o")
     scene.put("o", 0.385, 0.0)
     scene.move("o", 0.3, 0.0)
-    scene.m.command[0, 0] = KICK, 50.0, math.pi / 2
-    scene.m.kicked[0, 0] = True
-    memory.remember(scene.c, scene.s, scene.m, 0, 0)
+    scene.memory.command[0, 0] = KICK, 50.0, math.pi / 2
+    scene.memory.kicked[0, 0] = True
+    memory.remember(scene.w, 0, 0)
     # 50 * 0.027 = 1.35 to the left
     assert scene.seen("1", "o") == approx([0.685, 1.35])
-    assert scene.s.velocity[0, 0, scene.ball] == approx([0.94 * 0.3, 0.94 * 1.35])
+    assert scene.belief.velocity[0, 0, scene.ball] == approx([0.94 * 0.3, 0.94 * 1.35])
 
 
 def test_an_own_turn_is_part_of_what_is_expected():
     scene = Scene("1 o")
-    scene.m.turned[0, 0] = math.radians(30.0)
-    memory.remember(scene.c, scene.s, scene.m, 0, 0)
-    assert math.degrees(scene.s.body[0, 0, 0]) == approx(30.0)
+    scene.memory.turned[0, 0] = math.radians(30.0)
+    memory.remember(scene.w, 0, 0)
+    assert math.degrees(scene.belief.body[0, 0, 0]) == approx(30.0)
 
 
 def test_own_speed_is_felt_to_a_hundredth():
     scene = Scene("1 . . o", ROUNDED)
     scene.velocity[0] = 0.3 * 0.777, 0.4 * 0.777  # speed 0.3885
-    memory.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
-    assert scene.s.velocity[0, 0, 0] == approx([0.6 * 0.39, 0.8 * 0.39])
-    assert scene.s.age[0, 0, 0] == 0
+    memory.feel_self(scene.w, 0, 0)
+    assert scene.belief.velocity[0, 0, 0] == approx([0.6 * 0.39, 0.8 * 0.39])
+    assert scene.belief.age[0, 0, 0] == 0
 
 
 def test_whoever_runs_into_the_ball_believes_it_before_its_body():
     scene = Scene("1 . o")
-    scene.s.cycle[0] = 1
-    scene.s.position[0, 0, scene.ball] = 0.6, 0.0
-    scene.s.velocity[0, 0, scene.ball] = -0.5, 0.0
-    scene.s.velocity[0, 0, 0] = 0.9, 0.0  # expected now: 0.36; felt: reversed and slow
+    scene.belief.cycle[0] = 1
+    scene.belief.position[0, 0, scene.ball] = 0.6, 0.0
+    scene.belief.velocity[0, 0, scene.ball] = -0.5, 0.0
+    scene.belief.velocity[0, 0, 0] = 0.9, 0.0  # expected now: 0.36; felt: reversed and slow
     scene.velocity[0] = -0.05, 0.0
-    memory.feel_self(scene.c, scene.s, scene.m, scene.position, scene.velocity, 0, 0)
+    memory.feel_self(scene.w, 0, 0)
     assert scene.seen("1", "o") == approx([0.2, 0.0])
-    assert scene.s.velocity[0, 0, scene.ball] == approx([0.05, 0.0])
+    assert scene.belief.velocity[0, 0, scene.ball] == approx([0.05, 0.0])
 
 
 def test_a_new_episode_forgets_the_last():
     scene = Scene(WIDE)
     scene.move("o", 1.0, 0.0)
-    uniforms, cursor = np.array([[0.7]]), np.zeros(1, dtype=np.int64)
-    memory.forget(scene.c, scene.s, scene.m, 0, 0, uniforms, cursor)
-    assert np.all(scene.s.age[0, 0] == NEVER)
-    assert not scene.s.velocity[0, 0].any()
-    assert scene.m.look_phase[0, 0] == 2  # 0.7 * 3
+    scene.draw(0.7)
+    memory.forget(scene.w, 0, 0)
+    assert np.all(scene.belief.age[0, 0] == NEVER)
+    assert not scene.belief.velocity[0, 0].any()
+    assert scene.memory.look_phase[0, 0] == 2  # 0.7 * 3
 
 
 HEARD = """
@@ -302,13 +308,13 @@ HEARD = """
 
 
 def say(scene: Scene, name: str) -> None:
-    hearing.speak(scene.c, scene.s, scene.speech, scene.m, 0, scene.index(name), False)
+    hearing.speak(scene.w, 0, scene.index(name), False)
 
 
 def hear(scene: Scene, name: str, uniform: float) -> None:
     """Let a player hear the team-mate that this random number chooses."""
-    block, cursor = np.array([[uniform]]), np.zeros(1, dtype=np.int64)
-    hearing.hear(scene.c, scene.s, scene.speech, 0, scene.index(name), block, cursor)
+    scene.draw(uniform)
+    hearing.hear(scene.w, 0, scene.index(name))
 
 
 def test_a_player_speaks_of_the_ball_and_of_an_opponent_near_it():
@@ -339,34 +345,34 @@ def test_a_message_helps_who_has_not_seen_the_ball_for_four_cycles():
     say(scene, "2")
     for age, x in ((3, 7.0), (4, 7.25)):
         scene.believe()
-        scene.s.age[0, 0, scene.ball] = age
+        scene.belief.age[0, 0, scene.ball] = age
         hear(scene, "1", 0.1)
-        assert scene.s.position[0, 0, scene.ball, 0] == approx(x)
-    assert scene.s.age[0, 0, scene.ball] == 1
+        assert scene.belief.position[0, 0, scene.ball, 0] == approx(x)
+    assert scene.belief.age[0, 0, scene.ball] == 1
 
 
 def test_who_is_near_the_ball_trusts_itself():
     scene = Scene(HEARD)
     say(scene, "2")
-    scene.s.age[0, 0, scene.ball] = 8
-    scene.s.position[0, 0, scene.ball] = 2.9, 0.0
+    scene.belief.age[0, 0, scene.ball] = 8
+    scene.belief.position[0, 0, scene.ball] = 2.9, 0.0
     hear(scene, "1", 0.1)
-    assert scene.s.position[0, 0, scene.ball] == approx([2.9, 0.0])
+    assert scene.belief.position[0, 0, scene.ball] == approx([2.9, 0.0])
 
 
 def test_one_message_a_cycle_is_heard_and_only_of_team_mates():
     scene = Scene(HEARD, ROUNDED)
     for name in "123a":
         say(scene, name)
-    scene.s.age[0, 0] = [0, 9, 9, 9, 0]
+    scene.belief.age[0, 0] = [0, 9, 9, 9, 0]
     hear(scene, "1", 0.6)  # the second of two team-mates: 3
-    assert scene.s.age[0, 0].tolist() == [0, 9, 1, 9, 0]
-    assert scene.s.position[0, 0, 2] == approx([11.6, 0.0])
+    assert scene.belief.age[0, 0].tolist() == [0, 9, 1, 9, 0]
+    assert scene.belief.position[0, 0, 2] == approx([11.6, 0.0])
     hear(scene, "1", 0.4)  # 2 tells of the taker
-    assert scene.s.age[0, 0].tolist() == [0, 9, 1, 1, 0]
-    before = scene.s.position[0, 3].copy()
+    assert scene.belief.age[0, 0].tolist() == [0, 9, 1, 1, 0]
+    before = scene.belief.position[0, 3].copy()
     hear(scene, "a", 0.5)  # has nobody to listen to
-    np.testing.assert_array_equal(scene.s.position[0, 3], before)
+    np.testing.assert_array_equal(scene.belief.position[0, 3], before)
 
 
 @pytest.mark.parametrize(
@@ -375,8 +381,8 @@ def test_one_message_a_cycle_is_heard_and_only_of_team_mates():
 )
 def test_a_neck_turns_toward_a_point_as_far_as_it_goes(y, turn, neck):
     scene = Scene("1 o")
-    sight.turn_neck(scene.c, scene.s, 0, 0, 4.0, y, math.radians(turn))
-    assert math.degrees(scene.s.neck[0, 0]) == approx(neck)
+    sight.turn_neck(scene.w, 0, 0, 4.0, y, math.radians(turn))
+    assert math.degrees(scene.belief.neck[0, 0]) == approx(neck)
 
 
 def test_exact_scenes_need_no_random_numbers():

@@ -8,12 +8,14 @@ import math
 
 import numpy as np
 import pytest
+from scenes import draws
 
 from keepaway_sim.task import Task
 from keepaway_sim.world import physics
 from keepaway_sim.world.bodies import Bodies
 from keepaway_sim.world.config import profile
 from keepaway_sim.world.constants import pack
+from keepaway_sim.world.state import Scratch
 
 approx = pytest.approx
 
@@ -36,9 +38,12 @@ def test_dash_accelerates_along_the_body(c, power, degrees, expected):
     assert physics.dash_acceleration(c, power, math.radians(degrees)) == approx(expected, abs=1e-12)
 
 
+NOISY = physics.Limits(accel=1.0, speed=1.2, rand=0.1)
+
+
 def no_noise(c, velocity, acceleration, accel_max, speed_max):
-    none = np.zeros((1, 1)), np.zeros(1, dtype=np.int64)
-    return physics.moved_velocity(*velocity, *acceleration, accel_max, speed_max, 0.0, *none, 0)
+    limits = physics.Limits(accel_max, speed_max, 0.0)
+    return physics.moved_velocity(*velocity, *acceleration, limits, draws(), 0)
 
 
 def test_full_dashes_approach_one_metre_a_cycle():
@@ -142,17 +147,17 @@ def test_acceleration_and_speed_of_the_ball_are_limited(velocity, acceleration, 
 
 def test_movement_noise_is_a_share_of_the_speed_in_a_random_direction():
     # U(0, 0.1 * 1.0) at 0.5 is 0.05; U(0, 2 pi) at 0.25 is straight left
-    uniforms, cursor = np.array([[0.5, 0.25, 0.9]]), np.zeros(1, dtype=np.int64)
-    moved = physics.moved_velocity(1.0, 0.0, 0.0, 0.0, 1.0, 1.2, 0.1, uniforms, cursor, 0)
+    random = draws(0.5, 0.25, 0.9)
+    moved = physics.moved_velocity(1.0, 0.0, 0.0, 0.0, NOISY, random, 0)
     assert moved == approx((1.0, 0.05), abs=1e-9)
-    assert cursor[0] == 2
+    assert random.cursor[0] == 2
 
 
 def test_what_lies_still_draws_no_noise():
-    uniforms, cursor = np.array([[0.5, 0.25]]), np.zeros(1, dtype=np.int64)
-    moved = physics.moved_velocity(0.0, 0.0, 0.0, 0.0, 1.0, 1.2, 0.1, uniforms, cursor, 0)
+    random = draws(0.5, 0.25)
+    moved = physics.moved_velocity(0.0, 0.0, 0.0, 0.0, NOISY, random, 0)
     assert moved == (0.0, 0.0)
-    assert cursor[0] == 0
+    assert random.cursor[0] == 0
 
 
 def separated(places, radii, velocity=None):
@@ -160,8 +165,9 @@ def separated(places, radii, velocity=None):
     position = np.array([place if isinstance(place, tuple) else (place, 0.0) for place in places])
     moving = np.array(velocity, dtype=float) if velocity else np.ones_like(position)
     num = len(radii)
-    scratch = np.zeros((num, 2)), np.zeros(num), np.zeros(num, dtype=np.bool_)
-    physics.separate(position, moving, np.array(radii), *scratch)
+    places, none = np.zeros((num, 2)), np.zeros(1)
+    scratch = Scratch(places.copy(), places, np.zeros(num), np.zeros(num, dtype=np.bool_), none)
+    physics.separate(position, moving, np.array(radii), scratch)
     return position, moving
 
 
@@ -217,17 +223,20 @@ def test_bodies_move_by_their_velocity_exactly_wherever_their_field_lies():
     bodies = Bodies(40, radius, 25.0)
     here = np.round(np.array([(1 / 3, -2 / 7), (4.1, 0.0), (-9.9, 3.3)]) * 2**30) / 2**30
     step = np.round(np.array([(0.7, 1 / 9), (-1.0, 0.2), (2.1, -1.7)]) * 2**30) / 2**30
-    bodies.motion[:, :, :2] = here + bodies.place[:, None, :]
-    bodies.motion[:, :, 2:] = step
-    touching = bodies.move()
-    assert len(touching) == 0
-    moved = bodies.motion[:, :, :2] - bodies.place[:, None, :]
+    discs = bodies.discs
+    discs.motion[:, :, :2] = here + discs.place[:, None, :]
+    discs.motion[:, :, 2:] = step
+    bodies.move()
+    assert not discs.touched.any()
+    moved = discs.motion[:, :, :2] - discs.place[:, None, :]
     np.testing.assert_array_equal(moved, np.broadcast_to(here + step, moved.shape))
 
 
 def test_only_fields_in_which_discs_touch_are_named():
     bodies = Bodies(20, np.array([0.3, 0.3, 0.085]), 25.0)
-    bodies.motion[:, :, :2] = bodies.place[:, None, :] + np.array([(0, 0), (4, 0), (8, 0)])
-    bodies.motion[7, 1, :2] = bodies.place[7] + (0.5, 0.0)
-    bodies.motion[13, 2, 2:] = (-3.8, 0.0)  # a ball that rolls against a player
-    assert set(bodies.move()) == {7, 13}
+    discs = bodies.discs
+    discs.motion[:, :, :2] = discs.place[:, None, :] + np.array([(0, 0), (4, 0), (8, 0)])
+    discs.motion[7, 1, :2] = discs.place[7] + (0.5, 0.0)
+    discs.motion[13, 2, 2:] = (-3.8, 0.0)  # a ball that rolls against a player
+    bodies.move()
+    assert np.flatnonzero(discs.touched).tolist() == [7, 13]

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from scenes import draws, make_record
 
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.world import referee
@@ -15,13 +16,12 @@ approx = pytest.approx
 
 def kicked_off(task, uniforms):
     """Positions and velocities after a kick-off with these random numbers."""
-    c = pack(task, profile("2005"))
-    position = np.full((task.num_players + 1, 2), 77.0)
-    velocity = np.ones_like(position)
-    cursor = np.zeros(1, dtype=np.int64)
-    referee.kick_off(c, position, velocity, np.array([uniforms], dtype=float), cursor, 0)
-    assert cursor[0] == 1 + 2 * task.num_players
-    return position, velocity
+    w = make_record(task, profile("2005"))
+    w = w._replace(random=draws(*uniforms))
+    w.truth.position[:], w.truth.velocity[:] = 77.0, 1.0
+    referee.kick_off(w, 0)
+    assert w.random.cursor[0] == 1 + 2 * task.num_players
+    return w.truth.position[0], w.truth.velocity[0]
 
 
 def test_without_jitter_players_stand_in_corners():

@@ -45,7 +45,7 @@ def started(task: Task, config: Config, numbers: list[int]) -> World:
 
 def snapshot(world: World, field: int) -> list[np.ndarray]:
     """Everything that one field is, copied."""
-    return [array[field].copy() for array in (*world.state, *world.perceptions)]
+    return [array[field].copy() for array in (*world.truth, *world.belief)]
 
 
 def assert_same(one: list[np.ndarray], other: list[np.ndarray]) -> None:
@@ -74,7 +74,7 @@ def test_a_field_alone_is_that_field_among_many(task, config):
         for field in lone_fields:
             alone[field].step(*lone_requests[field].draw())
             assert_same(snapshot(many, field), snapshot(alone[field], 0))
-    assert many.perceptions.episode.max() > 0  # kick-offs were among them
+    assert many.belief.episode.max() > 0  # kick-offs were among them
 
 
 def test_requests_may_be_any_arrays_of_whole_numbers_but_of_no_other_shape():
@@ -97,7 +97,7 @@ def test_positions_lie_on_a_grid_that_every_place_represents(task, config):
     requests = Requests(world, list(range(40)))
     for _ in range(100):
         world.step(*requests.draw())
-        for array in (world.state.position, world.state.velocity):
+        for array in (world.truth.position, world.truth.velocity):
             np.testing.assert_array_equal(array * GRID, np.round(array * GRID))
 
 
@@ -134,8 +134,8 @@ def test_a_stopped_field_rests_while_others_play():
     for _ in range(20):
         world.step(*requests.draw())
     assert_same(snapshot(world, 0), before)
-    assert world.perceptions.cycle[1] == 20
-    assert not world.perceptions.decision_due[0].any()
+    assert world.belief.cycle[1] == 20
+    assert not world.belief.decision_due[0].any()
 
 
 def test_an_aborted_episode_is_followed_by_the_next():
@@ -143,11 +143,11 @@ def test_an_aborted_episode_is_followed_by_the_next():
     requests = Requests(world, [1])
     world.step(*requests.draw())
     world.abort(0)
-    assert world.perceptions.outcome[0] == Outcome.ABORTED
-    assert not world.perceptions.decision_due.any()
+    assert world.belief.outcome[0] == Outcome.ABORTED
+    assert not world.belief.decision_due.any()
     world.step(*requests.draw())
-    assert (world.perceptions.episode[0], world.perceptions.cycle[0]) == (1, 0)
-    assert world.perceptions.outcome[0] == Outcome.IN_PLAY
+    assert (world.belief.episode[0], world.belief.cycle[0]) == (1, 0)
+    assert world.belief.outcome[0] == Outcome.IN_PLAY
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_requests_count_only_where_a_decision_is_due():
     world.abort(0)
     actions[:] = 77
     world.step(actions, targets)  # kicks off, whatever is asked for
-    assert world.perceptions.cycle[0] == 0
+    assert world.belief.cycle[0] == 0
 
 
 @pytest.mark.parametrize("task", [Task(2, 1), Task(3, 2), Task(5, 4)])
@@ -211,45 +211,45 @@ def test_fields_are_counted_from_nought(num_fields, field):
 
 def lay_out(world: World, places: list[tuple[float, float]]) -> None:
     """Put players and ball of field 0 where they are wanted, at rest."""
-    world.state.position[0] = places
-    world.state.velocity[0] = 0.0
+    world.truth.position[0] = places
+    world.truth.velocity[0] = 0.0
 
 
 def test_a_rolling_ball_slows_by_its_decay():
     world = started(Task(2, 1), noiseless(profile("2005")), [1])
     lay_out(world, [(-10, -10), (-10, 10), (10, 10), (-2, 0)])
-    world.state.velocity[0, 3] = 1.0, 0.0
+    world.truth.velocity[0, 3] = 1.0, 0.0
     action = np.array([[OPEN, OPEN, GO]])
     for x, speed in ((-1.0, 0.94), (-0.06, 0.8836), (0.8236, 0.830584)):
         world.step(action, np.zeros_like(action))
-        assert world.state.position[0, 3] == approx([x, 0.0], abs=1e-8)
-        assert world.state.velocity[0, 3] == approx([speed, 0.0], abs=1e-8)
+        assert world.truth.position[0, 3] == approx([x, 0.0], abs=1e-8)
+        assert world.truth.velocity[0, 3] == approx([speed, 0.0], abs=1e-8)
 
 
 def test_kicks_of_several_players_add_up():
     # both hold the ball toward their own side: S adds their accelerations before limiting them
     world = started(Task(2, 1), noiseless(profile("2005")), [1])
     lay_out(world, [(0, 0), (-10, 10), (1.2, 0), (0.6, 0.3)])
-    world.perceptions.body[0] = world.state.yaw[0] = 0.0, 0.0, math.pi
+    world.belief.body[0] = world.truth.yaw[0] = 0.0, 0.0, math.pi
     for player in range(3):
-        world.perceptions.position[0, player] = world.state.position[0]
-        world.perceptions.velocity[0, player] = 0.0
-        world.perceptions.age[0, player] = 0
-    world.perceptions.ball_kickable[0] = [True, False, True]
+        world.belief.position[0, player] = world.truth.position[0]
+        world.belief.velocity[0, player] = 0.0
+        world.belief.age[0, player] = 0
+    world.belief.ball_kickable[0] = [True, False, True]
     action = np.array([[HOLD, OPEN, GO]])
     world.step(action, np.zeros_like(action))
-    commands = world._memory.command[0]
+    commands = world.commands[0]
     assert commands[[0, 2], 0].tolist() == [3.0, 3.0]
     total = np.zeros(2)
     for player in (0, 2):
         rel = np.array([(0.6, 0.3), (-0.6, 0.3)][player // 2])
-        yaw, distance = world.state.yaw[0, player], np.linalg.norm(rel)
+        yaw, distance = world.truth.yaw[0, player], np.linalg.norm(rel)
         off = abs(math.remainder(math.atan2(rel[1], rel[0]) - yaw, 2 * math.pi)) / math.pi
         rate = 0.027 * (1 - 0.25 * off - 0.25 * (distance - 0.385) / 0.7)
         angle = yaw + commands[player, 2]
         total += rate * commands[player, 1] * np.array([math.cos(angle), math.sin(angle)])
     assert np.linalg.norm(total) < 2.7
-    assert world.state.velocity[0, 3] == approx(0.94 * total, abs=1e-6)
+    assert world.truth.velocity[0, 3] == approx(0.94 * total, abs=1e-6)
 
 
 def test_a_pass_decision_is_carried_on_for_one_cycle_without_asking():
@@ -257,12 +257,12 @@ def test_a_pass_decision_is_carried_on_for_one_cycle_without_asking():
     see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
     action = np.array([[PASS, OPEN, OPEN, GO]])
     world.step(action, np.ones_like(action))  # the ball lies behind: it is set up first
-    assert world.perceptions.ball_kickable[0, 0]
-    assert world.perceptions.decision_due[0].tolist() == [False, True, True, True]
+    assert world.belief.ball_kickable[0, 0]
+    assert world.belief.decision_due[0].tolist() == [False, True, True, True]
     world.step(np.array([[77, OPEN, OPEN, GO]]), np.zeros_like(action))
-    assert world.state.action[0, 0] == PASS
-    assert np.linalg.norm(world.state.velocity[0, 4]) > 1.0
-    assert world.perceptions.decision_due[0].all()
+    assert world.truth.action[0, 0] == PASS
+    assert np.linalg.norm(world.truth.velocity[0, 4]) > 1.0
+    assert world.belief.decision_due[0].all()
 
 
 @pytest.mark.parametrize(("by_rank", "receiver"), [(True, 2), (False, 1)])
@@ -271,21 +271,21 @@ def test_a_pass_in_two_kicks_goes_to_the_keeper_that_is_of_that_rank_then(by_ran
     see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
     action = np.array([[PASS, OPEN, OPEN, GO]])
     world.step(action, np.ones_like(action))  # to keeper 1, the closest
-    world.perceptions.position[0, 0, 2] = 0.0, 9.0  # now keeper 2 is
+    world.belief.position[0, 0, 2] = 0.0, 9.0  # now keeper 2 is
     world.step(action, np.ones_like(action))
-    assert world.state.target[0, 0] == receiver
+    assert world.truth.target[0, 0] == receiver
 
 
 def see(world: World, places: list[tuple[float, float]]) -> None:
     """Lay out field 0, everybody facing +x, and let everybody know all of it."""
     lay_out(world, places)
-    world.state.yaw[0] = 0.0
-    world.perceptions.body[0] = 0.0
-    world.perceptions.position[0] = places
-    world.perceptions.velocity[0] = 0.0
-    world.perceptions.age[0] = 0
-    away = np.linalg.norm(world.state.position[0, :-1] - world.state.position[0, -1], axis=1)
-    world.perceptions.ball_kickable[0] = away < 1.085
+    world.truth.yaw[0] = 0.0
+    world.belief.body[0] = 0.0
+    world.belief.position[0] = places
+    world.belief.velocity[0] = 0.0
+    world.belief.age[0] = 0
+    away = np.linalg.norm(world.truth.position[0, :-1] - world.truth.position[0, -1], axis=1)
+    world.belief.ball_kickable[0] = away < 1.085
 
 
 def test_the_ball_is_taken_in_the_fifth_cycle_with_a_taker_near():
@@ -293,21 +293,21 @@ def test_the_ball_is_taken_in_the_fifth_cycle_with_a_taker_near():
     see(world, [(-9, 0), (-9, 9), (0, 0), (0.5, 0)])  # the taker holds it, keepers are far
     action = np.array([[OPEN, OPEN, GO]])
     counts = []
-    while world.perceptions.outcome[0] == Outcome.IN_PLAY:
+    while world.belief.outcome[0] == Outcome.IN_PLAY:
         world.step(action, np.zeros_like(action))
-        counts.append(int(world.state.take_count[0]))
+        counts.append(int(world.truth.take_count[0]))
     assert counts == [1, 2, 3, 4, 4]
-    assert world.perceptions.outcome[0] == Outcome.TAKEN_AWAY
+    assert world.belief.outcome[0] == Outcome.TAKEN_AWAY
 
 
 def test_a_ball_that_is_taken_may_still_leave_the_field():
     world = started(Task(2, 1), noiseless(profile("2005")), [1])
     see(world, [(-9, 0), (-9, 9), (11, 0), (12.4, 0)])
-    world.state.velocity[0, 3] = 0.5, 0.0
-    world.state.take_count[0] = 4
+    world.truth.velocity[0, 3] = 0.5, 0.0
+    world.truth.take_count[0] = 4
     action = np.array([[OPEN, OPEN, GO]])
     world.step(action, np.zeros_like(action))
-    assert world.perceptions.outcome[0] == Outcome.OUT_OF_BOUNDS
+    assert world.belief.outcome[0] == Outcome.OUT_OF_BOUNDS
 
 
 def test_no_taker_stays_for_ever_where_it_cannot_dash_backward():
@@ -315,14 +315,14 @@ def test_no_taker_stays_for_ever_where_it_cannot_dash_backward():
     world = started(Task(), profile("v19"), [1])
     places = [(-8.7, 7.8), (-7.7, -8.6), (6.49, 5.46), (7.42, 6.41), (6.99, 5.79), (5.65, 5.62)]
     see(world, places)
-    world.state.yaw[0] = 0.0, 0.0, 1.81, 0.34, -0.19
-    world.perceptions.body[0] = world.state.yaw[0]
+    world.truth.yaw[0] = 0.0, 0.0, 1.81, 0.34, -0.19
+    world.belief.body[0] = world.truth.yaw[0]
     action = np.array([[OPEN, OPEN, HOLD, GO, GO]])
     for _ in range(300):
         world.step(action, np.zeros_like(action))
-        if world.perceptions.outcome[0] != Outcome.IN_PLAY:
+        if world.belief.outcome[0] != Outcome.IN_PLAY:
             break
-    assert world.perceptions.outcome[0] != Outcome.IN_PLAY
+    assert world.belief.outcome[0] != Outcome.IN_PLAY
 
 
 def play(config: Config, numbers: list[int], cycles: int = 60) -> World:
@@ -337,11 +337,11 @@ def play(config: Config, numbers: list[int], cycles: int = 60) -> World:
 def test_without_noise_nothing_is_drawn_between_kick_offs():
     world = started(Task(), noiseless(profile("v19", hearing=False)), [1])
     action = np.array([[GO, GO, OPEN, GO, GO]])
-    drawn = world._streams.cursor.copy()
+    drawn = world._streams.draws.cursor.copy()
     for _ in range(10):
         world.step(action, np.zeros_like(action))
-    assert world.perceptions.cycle[0] == 10
-    np.testing.assert_array_equal(world._streams.cursor, drawn)
+    assert world.belief.cycle[0] == 10
+    np.testing.assert_array_equal(world._streams.draws.cursor, drawn)
 
 
 @pytest.mark.parametrize(
@@ -365,7 +365,7 @@ def test_without_noise_nothing_is_drawn_between_kick_offs():
 def test_every_switch_makes_a_difference(switch):
     with_it = play(profile("v19"), [1, 2, 3])
     without = play(profile("v19", **switch), [1, 2, 3])
-    assert not np.array_equal(with_it.state.position, without.state.position)
+    assert not np.array_equal(with_it.truth.position, without.truth.position)
 
 
 def test_an_exact_view_is_the_truth():
@@ -373,17 +373,17 @@ def test_an_exact_view_is_the_truth():
     requests = Requests(world, [1])
     for _ in range(120):
         world.step(*requests.draw())
-        s = world.perceptions
+        s = world.belief
         if s.outcome[0] != Outcome.IN_PLAY:
             continue
         assert not s.age[0].any()
-        truth = np.broadcast_to(world.state.position[0], s.position[0].shape)
+        truth = np.broadcast_to(world.truth.position[0], s.position[0].shape)
         np.testing.assert_allclose(s.position[0], truth, atol=1e-8)
 
 
 def check_limits(world: World) -> None:
     """All that must hold of any field in any cycle."""
-    state, s, c = world.state, world.perceptions, pack(world.task, world.config)
+    state, s, c = world.truth, world.belief, pack(world.task, world.config)
     half = np.array([c.field_length, c.field_width]) / 2
     playing = s.outcome == Outcome.IN_PLAY
     for array in (*state, *s):
@@ -430,6 +430,6 @@ def test_a_million_random_cycles_stay_finite_and_within_limits(task, config, ste
         world.step(action, target)
         if step % 2 == 0 or step < 100:
             check_limits(world)
-    assert world.state.time.sum() == num_fields * steps
-    assert world.perceptions.episode.min() >= 0
-    assert world.perceptions.episode.max() > 1
+    assert world.truth.time.sum() == num_fields * steps
+    assert world.belief.episode.min() >= 0
+    assert world.belief.episode.max() > 1

@@ -8,12 +8,13 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from keepaway_agent.actions import NO_TARGET, Action, Outcome, Role
+from keepaway_agent.compiled import Kernel
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
 from keepaway_agent.learning.features import ORDERINGS, keeper_features, keeper_state, rank_players
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE
 from keepaway_agent.playing.policies import make_player
-from keepaway_agent.training.trainer import decide_all
+from keepaway_agent.training.deciding import Deciders, decide_all
 from keepaway_agent.training.trial import child_seed
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
@@ -55,27 +56,38 @@ class Fields:
         n, num_players = self.task.num_keepers, self.task.num_players
         shape = (num_fields, num_players)
         self.choosing = np.zeros((num_fields, n), dtype=np.bool_)
-        self.cycle = self._world.perceptions.cycle
+        self.cycle = self._world.belief.cycle
         self._keeper = make_player(0, n, "hold", ordering)
         self._taker = make_player(n, n, taker_policy)
-        self._policy = np.full(shape, self._keeper.policy)
-        self._policy[:, n:] = self._taker.policy
-        self._learners = [
+        policy = np.full(shape, self._keeper.policy)
+        policy[:, n:] = self._taker.policy
+        keepers, takers = (
             sarsa.make_learners(
                 num_fields * size, n, make_tiling(role, n, self.task.num_takers), None
             )
             for role, size in ((Role.KEEPER, n), (Role.TAKER, self.task.num_takers))
-        ]
+        )
         self._ordering = ORDERINGS[ordering]
         self._streams = RandomStreams(num_fields * num_players, UNIFORMS_PER_CHOICE, block=512)
-        self._order = np.zeros(num_players, dtype=np.int64)
-        self._action = np.zeros(shape, dtype=np.int64)
-        self._target = np.zeros(shape, dtype=np.int64)
+        self._deciders = Deciders(
+            belief=self._world.belief,
+            keepers=keepers,
+            takers=takers,
+            policy=policy,
+            keeper=self._keeper,
+            taker=self._taker,
+            random=self._streams.draws,
+            order=np.zeros(num_players, dtype=np.int64),
+            action=np.zeros(shape, dtype=np.int64),
+            target=np.zeros(shape, dtype=np.int64),
+            chose=np.zeros(shape, dtype=np.bool_),
+        )
+        self._decide_all = Kernel(decide_all, self._deciders)
 
     @property
     def is_over(self) -> np.ndarray:
         """(num_fields,) whether the episode has ended; the next cycle kicks off a new one."""
-        over: np.ndarray = self._world.perceptions.outcome != Outcome.IN_PLAY
+        over: np.ndarray = self._world.belief.outcome != Outcome.IN_PLAY
         return over
 
     def start(self, field: int, seed: np.random.SeedSequence) -> None:
@@ -98,51 +110,30 @@ class Fields:
         action, target = Action.HOLD_BALL, NO_TARGET
         if choice:
             self._rank(field, keeper)
-            action, target = Action.PASS_BALL, int(self._order[choice])
-        self._action[field, keeper], self._target[field, keeper] = action, target
+            action, target = Action.PASS_BALL, int(self._deciders.order[choice])
+        self._deciders.action[field, keeper], self._deciders.target[field, keeper] = action, target
 
     def step(self, moving: np.ndarray) -> None:
         """Play a cycle on the fields of (num_fields,) `moving`; time stands still on the others."""
-        running = self._world.state.running
-        running[:] = moving
-        self._world.step(self._action, self._target)
-        running[:] = True
+        self._world.step(self._deciders.action, self._deciders.target, moving)
         self._look(moving)
 
     def observe(self, field: int, keeper: int, into: np.ndarray) -> None:
         """Write a keeper's state variables, itself being K1, into (4n + 2m - 3,) `into`."""
         self._rank(field, keeper)
-        position = self._world.perceptions.position[field, keeper]
-        keeper_state(position, self._order, self.task.num_keepers, into)
+        position = self._world.belief.position[field, keeper]
+        keeper_state(position, self._deciders.order, self.task.num_keepers, into)
 
     def _rank(self, field: int, keeper: int) -> None:
-        position = self._world.perceptions.position[field, keeper]
+        position = self._world.belief.position[field, keeper]
         num_keepers = self.task.num_keepers
-        rank_players(position, num_keepers, keeper, -1, self._ordering, self._order)
+        rank_players(position, num_keepers, keeper, -1, self._ordering, self._deciders.order)
 
     def _look(self, moved: np.ndarray) -> None:
         """Let everybody answer by rule where time went by, and find out who has a choice."""
         self._streams.refill()
-        due, cursor = self._world.perceptions.decision_due, self._streams.cursor
-        known, before = due.copy(), cursor.copy()
-        due[~moved] = False
-        decide_all(
-            0,
-            len(moved),
-            self._world.perceptions,
-            *self._learners,
-            self._policy,
-            self._keeper,
-            self._taker,
-            self._streams.uniforms,
-            cursor,
-            self._order,
-            self._action,
-            self._target,
-        )
-        due[:] = known
-        chose = (cursor != before).reshape(due.shape)  # who has a choice used up random numbers
-        self.choosing[moved] = chose[moved, : self.task.num_keepers]
+        self._decide_all(moved)
+        self.choosing[moved] = self._deciders.chose[moved, : self.task.num_keepers]
 
 
 def observation_space(task: Task) -> Box:

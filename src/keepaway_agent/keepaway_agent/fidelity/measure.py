@@ -163,7 +163,7 @@ class Recorder:
 
     def __call__(self, world: World) -> None:
         """Take note of the cycle that the world has come to."""
-        state, seen = world.state, world.perceptions
+        state, seen = world.truth, world.belief
         kinds = world.commands[:, :, 0]
         for f in np.flatnonzero(state.running & (seen.outcome == Outcome.IN_PLAY)):
             done = np.stack([kinds[f] == kind for kind in (KICK, DASH, TURN)], axis=1)

@@ -43,6 +43,16 @@ UNIFORMS_PER_CHOICE: Final = 3
 """Random numbers that one choice takes, whether it needs them or not: explore? which? tie."""
 
 
+class Rates(NamedTuple):
+    """The numbers of a SarsaConfig, as compiled functions take them."""
+
+    alpha: float
+    gamma: float
+    lambda_: float
+    epsilon: float
+    min_trace: float
+
+
 class Learners(NamedTuple):
     """What any number of learners know and remember, one row each. Made by `make_learners`."""
 
@@ -50,12 +60,7 @@ class Learners(NamedTuple):
     table: np.ndarray  # (num_learners,) int64, whose weights: an index into the first axis above
     lows: np.ndarray  # (num_features,) the tiling, the same for all
     widths: np.ndarray  # (num_features,)
-    # learning parameters
-    alpha: np.ndarray  # (num_learners,)
-    gamma: np.ndarray  # (num_learners,)
-    lambda_: np.ndarray  # (num_learners,)
-    epsilon: np.ndarray  # (num_learners,)
-    min_trace: np.ndarray  # (num_learners,)
+    rates: Rates  # learning parameters, the same for all
     # the last decision
     state: np.ndarray  # (num_learners, num_features) what it was made on
     values: np.ndarray  # (num_learners, num_actions) of every action then
@@ -84,8 +89,7 @@ def make_learners(
         num_learners: how many.
         num_actions: what each chooses from.
         tiling: of their state variables.
-        config: how they learn. (The parameters are arrays: learners may differ in them, but
-            only those made with lambda_ > 0 have room for traces.)
+        config: how they learn.
         learners_per_table: 1 gives each its own weights; n lets n neighbours share one value
             function, each with its own traces and decisions.
 
@@ -104,11 +108,7 @@ def make_learners(
         table=np.arange(num_learners) // learners_per_table,
         lows=np.array(tiling.lows),
         widths=np.array(tiling.widths),
-        alpha=np.full(num_learners, float(config.alpha)),
-        gamma=np.full(num_learners, float(config.gamma)),
-        lambda_=np.full(num_learners, float(config.lambda_)),
-        epsilon=np.full(num_learners, float(config.epsilon)),
-        min_trace=np.full(num_learners, float(config.min_trace)),
+        rates=Rates(*(float(getattr(config, name)) for name in Rates._fields)),
         state=np.zeros(per_feature),
         values=np.zeros((num_learners, num_actions)),
         action=np.full(num_learners, NO_ACTION),
@@ -191,7 +191,9 @@ def start(learners, i, uniforms):
     """
     clear_traces(learners, i)
     look(learners, i)
-    return remember(learners, i, epsilon_greedy(learners.values[i], learners.epsilon[i], uniforms))
+    return remember(
+        learners, i, epsilon_greedy(learners.values[i], learners.rates.epsilon, uniforms)
+    )
 
 
 @compiled
@@ -209,10 +211,10 @@ def step(learners, i, r_t, discount_t, uniforms):
         the action chosen.
     """
     look(learners, i)
-    action = epsilon_greedy(learners.values[i], learners.epsilon[i], uniforms)
+    action = epsilon_greedy(learners.values[i], learners.rates.epsilon, uniforms)
     update(learners, i, r_t + discount_t * learners.values[i, action] - learners.value[i])
-    if learners.lambda_[i] > 0.0:
-        decay_traces(learners, i, discount_t * learners.lambda_[i])
+    if learners.rates.lambda_ > 0.0:
+        decay_traces(learners, i, discount_t * learners.rates.lambda_)
     return remember(learners, i, action)
 
 
@@ -243,7 +245,7 @@ def decide(learners, i, reward, cycle, uniforms):
     if learners.action[i] == NO_ACTION:
         action = start(learners, i, uniforms)
     else:
-        r_t, discount_t = pay(reward, learners.gamma[i], cycle - learners.cycle[i])
+        r_t, discount_t = pay(reward, learners.rates.gamma, cycle - learners.cycle[i])
         action = step(learners, i, r_t, discount_t, uniforms)
     learners.cycle[i] = cycle
     return action
@@ -252,7 +254,7 @@ def decide(learners, i, reward, cycle, uniforms):
 @compiled
 def finish(learners, i, reward, cycle):
     """Learn from an episode's end at `cycle`, where every cycle paid `reward`."""
-    end(learners, i, pay(reward, learners.gamma[i], cycle - learners.cycle[i])[0])
+    end(learners, i, pay(reward, learners.rates.gamma, cycle - learners.cycle[i])[0])
 
 
 @compiled
@@ -279,7 +281,7 @@ def remember(learners, i, action):
     learners.value[i] = learners.values[i, action]
     for feature in range(learners.cells.shape[1]):
         learners.cells[i, feature] = learners.next_cells[i, feature]
-    if learners.lambda_[i] > 0.0:
+    if learners.rates.lambda_ > 0.0:
         replace_traces(learners, i)
     return action
 
@@ -288,8 +290,8 @@ def remember(learners, i, action):
 def update(learners, i, delta):
     """Add alpha / num_active * delta * traces to the weights."""
     weights = learners.weights[learners.table[i]]
-    amount = learners.alpha[i] / (weights.shape[1] * NUM_TILINGS) * delta
-    if learners.lambda_[i] == 0.0:
+    amount = learners.rates.alpha / (weights.shape[1] * NUM_TILINGS) * delta
+    if learners.rates.lambda_ == 0.0:
         add_to_active(weights[learners.action[i]], learners.cells[i], amount)
         return
     flat, traces, traced = weights.reshape(-1), learners.traces[i], learners.traced[i]
@@ -305,7 +307,7 @@ def decay_traces(learners, i, decay):
     for k in range(learners.num_traced[i]):
         place = traced[k]
         trace = traces[place] * decay
-        if trace > 0.0 and trace >= learners.min_trace[i]:
+        if trace > 0.0 and trace >= learners.rates.min_trace:
             traces[place] = trace
             traced[num_kept] = place
             num_kept += 1
@@ -346,6 +348,41 @@ def reset_learner(learners, i):
     """Let learner i, and all who share its weights, know nothing again."""
     learners.weights[learners.table[i]] = 0.0
     forget(learners, i)
+
+
+class LearnerSnapshot(NamedTuple):
+    """What a learner knows and remembers at one moment; see `snapshot`."""
+
+    weights: np.ndarray  # (num_actions, num_features, num_tiles * 32)
+    rows: list[np.ndarray]  # of the other arrays of `Learners`
+
+
+def snapshot(learners: Learners, i: int) -> LearnerSnapshot:
+    """Take down what learner i knows and remembers, a copy."""
+    rows = [array[i].copy() for array in _rows(learners)]
+    return LearnerSnapshot(learners.weights[learners.table[i]].copy(), rows)
+
+
+def restore(learners: Learners, i: int, snapshot: LearnerSnapshot) -> None:
+    """Let learner i, of the same tiling and rates, go on from a snapshot.
+
+    All who share its weights get those of the snapshot.
+
+    Raises:
+        AgentError: a snapshot of a learner of another shape.
+    """
+    shape = learners.weights.shape[1:]
+    if snapshot.weights.shape != shape:
+        raise AgentError(f"a snapshot of weights {snapshot.weights.shape}: they are {shape} here")
+    learners.weights[learners.table[i]] = snapshot.weights
+    for array, row in zip(_rows(learners), snapshot.rows, strict=True):
+        array[i] = row
+
+
+def _rows(learners: Learners) -> list[np.ndarray]:
+    """The arrays with a row for each learner."""
+    shared = ("weights", "table", "lows", "widths", "rates")
+    return [getattr(learners, name) for name in Learners._fields if name not in shared]
 
 
 def tiles_of(learners: Learners, i: int) -> np.ndarray:

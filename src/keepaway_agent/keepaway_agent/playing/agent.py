@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.compiled import entry_point
+from keepaway_agent.compiled import Kernel
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
@@ -207,9 +207,7 @@ class Agent:
         return self._answer
 
     def _decide(self, view: View) -> Decision:
-        action, target, chose = self._rule(
-            self.learners, 0, self._player, _as_compiled(view), self._uniforms, self._order
-        )
+        action, target, chose = self._rule(_as_compiled(view), self._uniforms, self._order)
         if not chose:
             return Decision(int(action), int(target), _NO_VALUES)
         self._uniforms = self._random.random(sarsa.UNIFORMS_PER_CHOICE)
@@ -217,7 +215,7 @@ class Agent:
         return Decision(int(action), int(target), values)
 
     def _end_episode(self, cycle: int, outcome: int) -> None:
-        policies.end_episode(self.learners, 0, self._player, cycle, outcome)
+        self._finish(cycle, int(outcome))
         if outcome == Outcome.ABORTED:
             self.cut_off += 1
         else:
@@ -231,9 +229,10 @@ class Agent:
         num = self.facts.num_players
         ages = np.zeros(num + 1, dtype=np.int32)
         nothing = View(np.zeros((num + 1, 2)), ages, ages[:-1], False, 0)
-        arguments = self.learners, 0, self._player, nothing, self._uniforms, self._order
-        self._rule = entry_point(rule, *arguments)
-        policies.end_episode(self.learners, 0, self._player, 0, int(Outcome.ABORTED))
+        self._rule = Kernel(rule, self.learners, 0, self._player)
+        self._rule.compile_for(nothing, self._uniforms, self._order)
+        self._finish = Kernel(policies.end_episode, self.learners, 0, self._player)
+        self._finish.compile_for(0, int(Outcome.ABORTED))
 
 
 def _as_compiled(view: View) -> View:

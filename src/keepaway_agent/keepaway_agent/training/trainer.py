@@ -20,18 +20,12 @@ from typing import Final
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.compiled import compiled, entry_point
+from keepaway_agent.compiled import Kernel
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE
-from keepaway_agent.playing.policies import (
-    Player,
-    View,
-    end_episode,
-    keeper_decision,
-    make_player,
-    taker_decision,
-)
+from keepaway_agent.playing.policies import make_player
+from keepaway_agent.training.deciding import Deciders, decide_all
 from keepaway_agent.training.trial import (
     Moment,
     Progress,
@@ -70,23 +64,22 @@ class Trainer:
             num_fields * task.num_players, reserve=UNIFORMS_PER_CHOICE, block=512
         )
         shape = (num_fields, task.num_players)
-        self._policy = np.zeros(shape, dtype=np.int64)
-        self._action = np.zeros(shape, dtype=np.int64)
-        self._target = np.zeros(shape, dtype=np.int64)
-        self._for_decide_all = (
-            self._world.perceptions,
-            self._teams[Role.KEEPER].learners,
-            self._teams[Role.TAKER].learners,
-            self._policy,
-            self._teams[Role.KEEPER].player,
-            self._teams[Role.TAKER].player,
-            self._streams.uniforms,
-            self._streams.cursor,
-            np.zeros(task.num_players, dtype=np.int64),
-            self._action,
-            self._target,
+        self._deciders = Deciders(
+            belief=self._world.belief,
+            keepers=self._teams[Role.KEEPER].learners,
+            takers=self._teams[Role.TAKER].learners,
+            policy=np.zeros(shape, dtype=np.int64),
+            keeper=self._teams[Role.KEEPER].player,
+            taker=self._teams[Role.TAKER].player,
+            random=self._streams.draws,
+            order=np.zeros(task.num_players, dtype=np.int64),
+            action=np.zeros(shape, dtype=np.int64),
+            target=np.zeros(shape, dtype=np.int64),
+            chose=np.zeros(shape, dtype=np.bool_),
         )
-        self._decide_all = entry_point(decide_all, 0, num_fields, *self._for_decide_all)
+        self._everywhere = np.ones(num_fields, dtype=np.bool_)
+        self._decide_all = Kernel(decide_all, self._deciders)
+        self._decide_all.compile_for(self._everywhere)
         self._lives: list[RunningTrial | None] = [None] * num_fields
         self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
         self._watched: set[int] = set()  # fields whose trial has a `watch`
@@ -113,17 +106,17 @@ class Trainer:
             for number in fields:
                 self._start_next(number, waiting)
             for cycle in itertools.count(1):
-                self._decide(0, len(fields))
+                self._decide(self._everywhere)
                 for number in self._fields_at_an_end():
                     if result := self._end_episode(number):
                         self._start_next(number, waiting)
-                        self._decide(number, number + 1)
+                        self._decide(np.arange(len(fields)) == number)
                         yield result
-                if not self._world.state.running.any():
+                if not self._world.truth.running.any():
                     return
                 if watch_cycle:
                     watch_cycle(self._world)
-                self._world.step(self._action, self._target)
+                self._world.step(self._deciders.action, self._deciders.target)
                 if watch and cycle % WATCH_INTERVAL == 0:
                     watch(self.progress)
         finally:
@@ -140,7 +133,9 @@ class Trainer:
         task = self.config.task
         for player in range(task.num_players):
             policy = trial.keeper_policy if player < task.num_keepers else trial.taker_policy
-            self._policy[number, player] = make_player(player, task.num_keepers, policy).policy
+            self._deciders.policy[number, player] = make_player(
+                player, task.num_keepers, policy
+            ).policy
             generator = np.random.default_rng(child_seed(trial.seed, 1, player))
             self._streams.seed(number * task.num_players + player, generator)
         self._teams[Role.KEEPER].prepare(number, trial.keeper_policy, trial.keeper_weights)
@@ -153,17 +148,17 @@ class Trainer:
 
     def _fields_at_an_end(self) -> list[int]:
         """Fields whose episode is over, or whose trial has used up its cycles."""
-        seen = self._world.perceptions
-        over = (seen.outcome != _IN_PLAY) | (seen.cycle >= self._cycles_left)
-        ended: list[int] = np.flatnonzero(over & self._world.state.running).tolist()
+        belief = self._world.belief
+        over = (belief.outcome != _IN_PLAY) | (belief.cycle >= self._cycles_left)
+        ended: list[int] = np.flatnonzero(over & self._world.truth.running).tolist()
         return ended
 
     def _end_episode(self, number: int) -> TrialResult | None:
         """Take note of a field's episode; the trial's result if that was its last."""
         life = self._lives[number]
         assert life is not None
-        cycle = int(self._world.perceptions.cycle[number])
-        outcome = int(self._world.perceptions.outcome[number])
+        cycle = int(self._world.belief.cycle[number])
+        outcome = int(self._world.belief.outcome[number])
         if outcome != _IN_PLAY:
             life.count(cycle, outcome)
             self.progress.episodes += 1
@@ -189,24 +184,27 @@ class Trainer:
             snapshots=life.snapshots,
         )
 
-    def _decide(self, first: int, last: int) -> None:
-        """Let players of fields first..last-1 answer, and pay those whose episode is over."""
+    def _decide(self, asked: np.ndarray) -> None:
+        """Let players of the (num_fields,) `asked` answer; those whose episode is over are paid."""
         self._streams.refill()
-        unused = self._streams.cursor.copy()
-        self._decide_all(first, last, *self._for_decide_all)
-        for number in self._watched.intersection(range(first, last)):
-            self._show(number, unused)
+        self._decide_all(asked)
+        for number in self._watched:
+            if asked[number]:
+                self._show(number)
 
-    def _show(self, number: int, unused: np.ndarray) -> None:
-        """Show a trial's moment; whoever chose has used up numbers of its stream since `unused`."""
-        life, task = self._lives[number], self.config.task
+    def _show(self, number: int) -> None:
+        """Show a trial's moment."""
+        life, deciders, num_keepers = (
+            self._lives[number],
+            self._deciders,
+            self.config.task.num_keepers,
+        )
         assert life is not None
         assert life.trial.watch is not None
-        streams = slice(number * task.num_players, (number + 1) * task.num_players)
-        chose = self._streams.cursor[streams] != unused[streams]
-        keepers = self._teams[Role.KEEPER].expected(number, chose[: task.num_keepers])
-        takers = self._teams[Role.TAKER].expected(number, chose[task.num_keepers :])
-        asked = self._action[number], self._target[number]
+        chose = deciders.chose[number]
+        keepers = self._teams[Role.KEEPER].expected(number, chose[:num_keepers])
+        takers = self._teams[Role.TAKER].expected(number, chose[num_keepers:])
+        asked = deciders.action[number], deciders.target[number]
         life.trial.watch(Moment(self._world, number, *asked, keepers + takers))
 
 
@@ -273,69 +271,3 @@ class _Team:
 
     def _rows(self, number: int) -> range:
         return range(number * self._size, (number + 1) * self._size)
-
-
-@compiled
-def decide_all(
-    first,
-    last,
-    perceptions,
-    keepers,
-    takers,
-    policy,
-    keeper,
-    taker,
-    uniforms,
-    cursor,
-    order,
-    action,
-    target,
-):
-    """Let every player answer whose answer is due, and pay those whose episode is over.
-
-    Args:
-        first: the first of the fields that are looked at.
-        last: one past the last of them.
-        perceptions: of the World.
-        keepers: Learners, num_keepers rows for each field.
-        takers: Learners, num_takers rows for each field.
-        policy: (num_fields, num_players) int64, each player's policy.
-        keeper: Player, what is the same for all keepers.
-        taker: Player, what is the same for all takers.
-        uniforms: (num_fields * num_players, block), a stream for each player.
-        cursor: (num_fields * num_players,) int64, where each stream goes on.
-        order: (num_players,) int64, scratch.
-        action: (num_fields, num_players) int64, written.
-        target: (num_fields, num_players) int64, written.
-    """
-    num_players, n = policy.shape[1], keeper.num_keepers
-    m = num_players - n
-    for f in range(first, last):
-        outcome, cycle = perceptions.outcome[f], perceptions.cycle[f]
-        for p in range(num_players):
-            team = keeper if p < n else taker
-            player = Player(p, n, policy[f, p], team.ordering, team.interval)
-            if outcome != Outcome.IN_PLAY:
-                if p < n:
-                    end_episode(keepers, f * n + p, player, cycle, outcome)
-                else:
-                    end_episode(takers, f * m + p - n, player, cycle, outcome)
-            if not perceptions.decision_due[f, p]:
-                continue
-            view = View(
-                perceptions.position[f, p],
-                perceptions.age[f, p],
-                perceptions.cycles_to_ball[f, p],
-                perceptions.ball_kickable[f, p],
-                cycle,
-            )
-            stream = f * num_players + p
-            at = cursor[stream]
-            draws = uniforms[stream, at : at + UNIFORMS_PER_CHOICE]
-            if p < n:
-                answer = keeper_decision(keepers, f * n + p, player, view, draws, order)
-            else:
-                answer = taker_decision(takers, f * m + p - n, player, view, draws, order)
-            action[f, p], target[f, p], chose = answer
-            if chose:
-                cursor[stream] = at + UNIFORMS_PER_CHOICE

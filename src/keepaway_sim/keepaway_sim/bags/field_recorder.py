@@ -63,14 +63,14 @@ class FieldRecorder:
 
     def moment(self) -> None:
         """Record the truth and what every player perceives of it."""
-        number = int(self._world.perceptions.episode[self._field])
+        number = int(self._world.belief.episode[self._field])
         if not self._wanted(number):
             return
         self._write("clock", CLOCK, self._say.clock())
         self._write("field_state", FIELD_STATE, self._say.field_state())
         for name, data in zip(self._names, self._say.perceptions(), strict=True):
             self._write(f"{name}/perception", PERCEPTION, data)
-        if self._world.perceptions.outcome[self._field] != Outcome.IN_PLAY:
+        if self._world.belief.outcome[self._field] != Outcome.IN_PLAY:
             self._write("episode", EPISODE, self._say.episode(self._seed))
 
     def requests(self, action: np.ndarray, target: np.ndarray, action_values: Any = None) -> None:
@@ -80,7 +80,7 @@ class FieldRecorder:
             action, target: (num_players,) int.
             action_values: for every player the values its learner saw, or an empty sequence.
         """
-        seen, field = self._world.perceptions, self._field
+        seen, field = self._world.belief, self._field
         number, cycle = int(seen.episode[field]), int(seen.cycle[field])
         if not self._wanted(number):
             return

@@ -47,9 +47,9 @@ def check_world(bag: MatchBag) -> Checked:
     begin_match(world, bag.match["seed"], bag.match.get("first_episode", 0))
     episodes = compared = 0
     for episode, track in whole_episodes(bag):
-        if episode.number != world.perceptions.episode[0]:
+        if episode.number != world.belief.episode[0]:
             raise KeepawayError(
-                f"{bag.reader.path}: episode {world.perceptions.episode[0]} was not recorded, so"
+                f"{bag.reader.path}: episode {world.belief.episode[0]} was not recorded, so"
                 f" episode {episode.number} cannot be played again"
             )
         for row in range(len(track.time)):
@@ -87,7 +87,7 @@ def _check_whole(bag: MatchBag, due: EpisodeSummary, episode: EpisodeSummary, fo
 
 
 def _compare(world: World, track: Track, row: int) -> Difference | None:
-    state, seen = world.state, world.perceptions
+    state, seen = world.truth, world.belief
     recorded = {
         "position": (track.position[row], state.position[0]),
         "yaw": (track.yaw[row], state.yaw[0]),

@@ -18,4 +18,4 @@ def begin_match(world: World, seed: int, first_episode: int = 0) -> None:
     """
     key = (*WORLD_KEY, first_episode) if first_episode else WORLD_KEY
     world.start(0, np.random.SeedSequence(seed, spawn_key=key))
-    world.perceptions.episode[0] = first_episode
+    world.belief.episode[0] = first_episode

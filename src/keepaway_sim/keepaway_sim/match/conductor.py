@@ -265,7 +265,7 @@ class Conductor:
         self._perceptions = self._messages.perceptions()
         for seat, data in zip(self.roster.seats, self._perceptions, strict=True):
             self._outlet.publish(f"{seat.name}/perception", data, stamp)
-        seen = self.world.perceptions
+        seen = self.world.belief
         if seen.outcome[0] != Outcome.IN_PLAY and seen.episode[0] == self.num_finished:
             self._outlet.publish("episode", self._messages.episode(self.settings.seed), stamp)
             self.num_finished += 1
@@ -308,7 +308,7 @@ class Conductor:
     def _remind(self, now: float) -> None:
         """Send again what may have been lost, and give up on who does not answer."""
         self._remind_at = now + RESEND_PERIOD
-        timeout, seen = self.settings.answer_timeout, self.world.perceptions
+        timeout, seen = self.settings.answer_timeout, self.world.belief
         for name in self.roster.dismiss(now, timeout):
             self._log.error(
                 f"{name} is missing: no answer for {timeout} s, episode {seen.episode[0]} cycle"
@@ -322,7 +322,7 @@ class Conductor:
         """Play the cycle; where a reset was asked for, the episode ends with it."""
         if self._is_told_to_end():
             return
-        stamp, seen = self._messages.stamp_ns(), self.world.perceptions
+        stamp, seen = self._messages.stamp_ns(), self.world.belief
         for name, data in self.roster.answers():
             topic = f"{name}/action_request"
             self._outlet.record_answer(topic, messages.ACTION_REQUEST, data, stamp)
@@ -351,7 +351,7 @@ class Conductor:
             self._outlet.record_answer(topic, messages.AGENT_STATUS, status["data"], stamp)
 
     def _warn_rejected(self, player: int, error: KeepawayError) -> None:
-        seen, name = self.world.perceptions, self.roster.seats[player].name
+        seen, name = self.world.belief, self.roster.seats[player].name
         self._warn(
             name, f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}"
         )

@@ -101,7 +101,7 @@ class Roster:
         Returns:
             names of the players who are back.
         """
-        seen = world.perceptions
+        seen = world.belief
         self._episode, self._cycle = int(seen.episode[0]), int(seen.cycle[0])
         self._due = seen.decision_due[0].tolist()
         self._kickable = seen.ball_kickable[0].tolist()

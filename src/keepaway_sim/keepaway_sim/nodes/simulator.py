@@ -161,7 +161,7 @@ class Simulator(Node):
 
     def _publish_diagnostics(self) -> None:
         conductor, now = self.conductor, time.monotonic()
-        seen, num_cycles = conductor.world.perceptions, conductor.num_cycles
+        seen, num_cycles = conductor.world.belief, conductor.num_cycles
         recent = (num_cycles - self._health_cycles) / (now - self._health_at)
         self._health_at, self._health_cycles = now, num_cycles
         figures = {

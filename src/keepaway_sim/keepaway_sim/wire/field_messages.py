@@ -46,7 +46,7 @@ class FieldMessages:
 
     def stamp_ns(self) -> int:
         """Simulated time since the field was started [ns]."""
-        return int(self._world.state.time[self._field]) * CYCLE_NS
+        return int(self._world.truth.time[self._field]) * CYCLE_NS
 
     def clock(self) -> bytes:
         """A Clock message."""
@@ -56,7 +56,7 @@ class FieldMessages:
 
     def perceptions(self) -> list[bytes]:
         """A Perception message of every player, in match order."""
-        messages, seen, field = self._perceptions, self._world.perceptions, self._field
+        messages, seen, field = self._perceptions, self._world.belief, self._field
         num = len(messages)
         self._fill_moment(messages)
         messages["decision_due"] = seen.decision_due[field]
@@ -71,12 +71,12 @@ class FieldMessages:
 
     def field_state(self) -> bytes:
         """A FieldState message: the truth."""
-        message, state, field = self._state, self._world.state, self._field
+        message, state, field = self._state, self._world.truth, self._field
         self._fill_moment(message)
         message["positions"] = state.position[field].reshape(-1)
         message["velocities"] = state.velocity[field].reshape(-1) / CYCLE_TIME
         message["yaws"] = state.yaw[field]
-        message["neck_yaws"] = self._world.perceptions.neck[field]
+        message["neck_yaws"] = self._world.belief.neck[field]
         message["actions"] = state.action[field]
         message["targets"] = state.target[field]
         message["take_counter"] = state.take_count[field]
@@ -84,7 +84,7 @@ class FieldMessages:
 
     def episode(self, seed: int) -> bytes:
         """An Episode message of the episode that has just ended; `seed` is the match's."""
-        seen, field = self._world.perceptions, self._field
+        seen, field = self._world.belief, self._field
         cycles = int(seen.cycle[field])
         return codec(EPISODE).encode(
             {
@@ -94,7 +94,7 @@ class FieldMessages:
                 "cycles": cycles,
                 "duration": cycles * CYCLE_TIME,
                 "outcome": int(seen.outcome[field]),
-                "lost_by": int(self._world.state.last_keeper[field]),
+                "lost_by": int(self._world.truth.last_keeper[field]),
             }
         )
 
@@ -122,13 +122,13 @@ class FieldMessages:
 
     def markers(self) -> bytes:
         """A MarkerArray that shows the truth in RViz and Foxglove."""
-        state, field = self._world.state, self._field
+        state, field = self._world.truth, self._field
         return marker_array(
             self._world.task, state.position[field], state.yaw[field], self.stamp_ns()
         )
 
     def _fill_moment(self, messages: np.ndarray) -> None:
-        now, seen, field = stamp(self.stamp_ns()), self._world.perceptions, self._field
+        now, seen, field = stamp(self.stamp_ns()), self._world.belief, self._field
         messages["stamp.sec"], messages["stamp.nanosec"] = now["sec"], now["nanosec"]
         messages["episode"] = seen.episode[field]
         messages["cycle"] = seen.cycle[field]

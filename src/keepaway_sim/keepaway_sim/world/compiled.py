@@ -42,7 +42,7 @@ SOURCES: Final = (
     "learning",
     "playing",
     "task.py",
-    "training/trainer.py",
+    "training/deciding.py",
     "world",
 )
 """Files and folders of both packages from which machine code is made."""
@@ -50,6 +50,7 @@ KEPT_FOLDERS: Final = 8
 """Folders of machine code that stay on disk; the least recently used ones go."""
 
 _SETTINGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_CHECKED: Final = os.environ.get("KEEPAWAY_CHECKED") == "1"
 _LOG = logging.getLogger(__name__)
 
 
@@ -63,15 +64,31 @@ def compiled_apart(function: Callable[..., Any]) -> Any:
     return _kept(njit(**_SETTINGS)(function))
 
 
-def entry_point(function: Any, *arguments: Any) -> Callable[..., Any]:
-    """The machine code of a compiled function, for arguments of the types of these.
+class Kernel:
+    """The machine code of a compiled function, called with some of its arguments fixed.
 
     A call of the function itself looks up the type of every array, which takes 10 us for some
-    forty of them; this takes a tenth of that. It must only get arguments of the same types: an
-    array is checked no further than by its number of axes and the size of its numbers.
+    forty of them; this takes a tenth of that. Later calls must bring arguments of the same types
+    as the first: an array is checked no further than by its number of axes and the size of its
+    numbers. With KEEPAWAY_CHECKED=1 every call goes the long way, which checks them.
     """
-    code: Callable[..., Any] = function.compile(tuple(typeof(value) for value in arguments))
-    return code
+
+    def __init__(self, function: Any, *frozen: Any) -> None:
+        """Take the first arguments, which no call repeats; nothing is compiled yet."""
+        self._function, self._frozen = function, frozen
+        self._code: Callable[..., Any] | None = function if _CHECKED else None
+
+    def compile_for(self, *arguments: Any) -> None:
+        """Compile for arguments of the types of these, so that the first call does not wait."""
+        types = tuple(typeof(value) for value in (*self._frozen, *arguments))
+        code = self._function.compile(types)
+        self._code = self._code or code
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function with the frozen arguments and these."""
+        if self._code is None:
+            self.compile_for(*arguments)
+        return self._code(*self._frozen, *arguments)  # type: ignore[misc]
 
 
 def _kept(dispatcher: Any) -> Any:

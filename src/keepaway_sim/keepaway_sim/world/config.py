@@ -110,7 +110,6 @@ class Vision:
         3, "one cycle in N brings no look (150 ms to 100 ms); 1: all do", "cycles", "[1, 1000]"
     )
     hearing: bool = setting(True, "team-mates' messages about the ball and themselves")
-    hear_distance: float = setting(50.0, "S: audio_cut_dist", "m", "[0, 1000]")
     hear_step_x: float = setting(
         1.45, "P: resolution of x in messages, 106 m in 73 steps", "m", "[0, 100]"
     )

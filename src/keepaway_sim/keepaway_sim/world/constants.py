@@ -35,7 +35,10 @@ _DERIVED = (
     "sight_first",  # the first edge beyond each whole multiple of 1 / SIGHT_CELLS m
     "direction_cosine",  # of every direction that is seen, from -pi to pi
     "direction_sine",
+    "open_x",  # (25,) [m] the points where a keeper may get open
+    "open_y",
 )
+OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
 
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
@@ -63,7 +66,15 @@ def pack(task: Task, config: Config) -> Any:
     values |= _direction_tables(values["direction_step"])
     values["ball_roll"] = _roll_table(physics.ball_decay)
     values["player_roll"] = _roll_table(physics.player_decay)
+    values |= _open_points(task, values["open_border"])
     return Constants(**values)
+
+
+def _open_points(task: Task, border: float) -> dict[str, np.ndarray]:
+    """The grid of points where a keeper may get open, `border` of a side away from the edge."""
+    share = np.linspace(-0.5, 0.5, OPEN_POINTS) * (1.0 - 2.0 * border)
+    x, y = np.meshgrid(task.field_length * share, -task.field_width * share, indexing="ij")
+    return {"open_x": x.ravel(), "open_y": y.ravel()}
 
 
 def _roll_table(decay: float) -> np.ndarray:

@@ -12,7 +12,14 @@ from keepaway_sim.world.geometry import TWO_PI, length
 from keepaway_sim.world.hearing import hear, speak
 from keepaway_sim.world.memory import feel_self, forget, remember
 from keepaway_sim.world.skills import tactics
-from keepaway_sim.world.skills.prediction import LATELY, UNKNOWN_SPEED, cycles_to_ball
+from keepaway_sim.world.skills.prediction import (
+    LATELY,
+    UNKNOWN_SPEED,
+    Body,
+    ball_of,
+    body_of,
+    cycles_to_ball,
+)
 from keepaway_sim.world.skills.running import expected_turn
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.streams import draw
@@ -36,229 +43,260 @@ def is_legal(c, player, action, target):
 
 
 @compiled
-def _first_illegal(c, state, s, action, target):
-    num = c.num_keepers + c.num_takers
-    for f in range(len(state.running)):
-        for p in range(num):
-            if s.decision_due[f, p] and not is_legal(c, p, action[f, p], target[f, p]):
-                return f * num + p
+def _first_illegal(w, playing, action, target):
+    for f in range(len(playing)):
+        for p in range(w.num_players):
+            due = playing[f] and w.belief.decision_due[f, p]
+            if due and not is_legal(w.constants, p, action[f, p], target[f, p]):
+                return f * w.num_players + p
     return -1
 
 
 @compiled_apart
-def start(c, state, s, m, speech, uniforms, cursor, f):
+def start(w, f):
     """First kick-off of a trial: nothing of an earlier one remains."""
-    for p in range(c.num_keepers + c.num_takers):
-        state.yaw[f, p] = TWO_PI * (draw(uniforms, cursor, f) - 0.5)
-        s.body[f, p, :] = state.yaw[f, p]
-        s.neck[f, p] = 0.0
-        s.position[f, p, :, :] = 0.0
-    m.self_error[f, :, :] = 0.0
-    state.time[f] = 0
-    state.running[f] = True
-    s.episode[f] = -1
-    _kick_off(c, state, s, m, speech, uniforms, cursor, f)
+    truth, belief, memory = w.truth, w.belief, w.memory
+    for p in range(w.num_players):
+        truth.yaw[f, p] = TWO_PI * (draw(w.random, f) - 0.5)
+        belief.body[f, p, :] = truth.yaw[f, p]
+        belief.neck[f, p] = 0.0
+        belief.position[f, p, :, :] = 0.0
+    memory.self_error[f, :, :] = 0.0
+    truth.time[f] = 0
+    truth.running[f] = True
+    belief.episode[f] = -1
+    _kick_off(w, f)
 
 
 @compiled
-def _kick_off(c, state, s, m, speech, uniforms, cursor, f):
-    referee.kick_off(c, state.position[f], state.velocity[f], uniforms, cursor, f)
-    state.take_count[f] = 0
-    state.last_keeper[f] = -1
-    s.outcome[f] = _IN_PLAY
-    s.episode[f] += 1
-    s.cycle[f] = 0
-    for p in range(c.num_keepers + c.num_takers):
-        state.action[f, p] = _OPEN if p < c.num_keepers else _GO
-        state.target[f, p] = 0
-        forget(c, s, m, f, p, uniforms, cursor)
+def _kick_off(w, f):
+    c, truth, belief, speech = w.constants, w.truth, w.belief, w.speech
+    referee.kick_off(w, f)
+    truth.take_count[f] = 0
+    truth.last_keeper[f] = -1
+    belief.outcome[f] = _IN_PLAY
+    belief.episode[f] += 1
+    belief.cycle[f] = 0
+    for p in range(w.num_players):
+        truth.action[f, p] = _OPEN if p < c.num_keepers else _GO
+        truth.target[f, p] = 0
+        forget(w, f, p)
         speech.ball_age[f, p] = -1
         speech.opponent[f, p] = -1
         speech.own_said[f, p] = False
-    _perceive(c, state, s, m, speech, uniforms, cursor, f)
+    _perceive(w, f)
 
 
 @compiled_apart
-def act(c, state, s, m, speech, motion, place, acceleration, uniforms, cursor, action, target):
+def act(w, playing, action, target):
     """Requests become commands, commands become this cycle's velocities.
+
+    Args:
+        w: Fields.
+        playing: (num_fields,) bool, on which of the running fields time goes by.
+        action, target: (num_fields, num_players) int64, requests.
 
     Returns:
         The first request (counted over all players) that is illegal, if any: then nothing was
         done; else -1.
     """
-    illegal = _first_illegal(c, state, s, action, target)
+    illegal = _first_illegal(w, playing, action, target)
     if illegal >= 0:
         return illegal
-    num = c.num_keepers + c.num_takers
-    for f in range(len(state.running)):
-        if not state.running[f] or s.outcome[f] != _IN_PLAY:
-            motion[f, :, 2:] = 0.0
+    for f in range(len(playing)):
+        if not (playing[f] and w.truth.running[f] and w.belief.outcome[f] == _IN_PLAY):
+            w.bodies.motion[f, :, 2:] = 0.0
             continue
-        acceleration[:] = 0.0
-        for p in range(num):
-            _take_request(c, state, s, m, f, p, action[f, p], target[f, p])
-            _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor)
-        for o in range(num + 1):
-            vx, vy = _velocity(c, state, acceleration, f, o, uniforms, cursor)
-            state.velocity[f, o, 0], state.velocity[f, o, 1] = vx, vy
-            motion[f, o, 0] = state.position[f, o, 0] + place[f, 0]
-            motion[f, o, 1] = state.position[f, o, 1] + place[f, 1]
-            motion[f, o, 2], motion[f, o, 3] = vx, vy
+        w.scratch.acceleration[:] = 0.0
+        for p in range(w.num_players):
+            _take_request(w, f, p, action[f, p], target[f, p])
+            _carry_out(w, f, p)
+        for o in range(w.ball + 1):
+            _set_off(w, f, o)
     return -1
 
 
 @compiled
-def _take_request(c, state, s, m, f, p, action, target):
-    if s.decision_due[f, p]:
-        state.action[f, p], state.target[f, p] = action, target
-        if action == _PASS and s.ball_kickable[f, p]:
-            m.pass_cycle[f, p] = s.cycle[f]
-            m.pass_rank[f, p] = tactics.rank_of(c, s, f, p, target)
-    elif c.pass_by_rank and state.action[f, p] == _PASS:
-        state.target[f, p] = tactics.keeper_of_rank(c, s, f, p, m.pass_rank[f, p])
+def _take_request(w, f, p, action, target):
+    c, truth, belief, memory = w.constants, w.truth, w.belief, w.memory
+    if belief.decision_due[f, p]:
+        truth.action[f, p], truth.target[f, p] = action, target
+        if action == _PASS and belief.ball_kickable[f, p]:
+            memory.pass_cycle[f, p] = belief.cycle[f]
+            memory.pass_rank[f, p] = tactics.rank_of(w, f, p, target)
+    elif c.pass_by_rank and truth.action[f, p] == _PASS:
+        truth.target[f, p] = tactics.keeper_of_rank(w, f, p, memory.pass_rank[f, p])
 
 
 @compiled
-def _carry_out(c, state, s, m, speech, acceleration, f, p, uniforms, cursor):
+def _carry_out(w, f, p):
     """Player p's command: what p expects of it, says of it, and what the server does with it."""
-    kind, power, angle = tactics.command(c, s, m, f, p, state.action[f, p], state.target[f, p])
-    m.command[f, p, 0], m.command[f, p, 1], m.command[f, p, 2] = kind, power, angle
-    m.turned[f, p] = expected_turn(c, s, f, p, kind, angle)
-    m.kicked[f, p] = False
+    c, truth, memory = w.constants, w.truth, w.memory
+    command = tactics.command(w, f, p, truth.action[f, p], truth.target[f, p])
+    kind, power, angle = command
+    memory.command[f, p, 0], memory.command[f, p, 1], memory.command[f, p, 2] = kind, power, angle
+    memory.turned[f, p] = expected_turn(w, f, p, command)
+    memory.kicked[f, p] = False
     if c.hearing:
-        speak(c, s, speech, m, f, p, kind == KICK)
-    yaw = state.yaw[f, p]
+        speak(w, f, p, kind == KICK)
+    yaw = truth.yaw[f, p]
     if kind == DASH:
         ax, ay = physics.dash_acceleration(c, power, yaw)
-        acceleration[p, 0] += ax
-        acceleration[p, 1] += ay
+        w.scratch.acceleration[p, 0] += ax
+        w.scratch.acceleration[p, 1] += ay
     elif kind == TURN:
-        noise = 2.0 * draw(uniforms, cursor, f) - 1.0 if c.turn_noise else 0.0
-        speed = length(state.velocity[f, p, 0], state.velocity[f, p, 1])
-        state.yaw[f, p] = physics.turned_yaw(c, yaw, angle, speed, noise)
+        noise = 2.0 * draw(w.random, f) - 1.0 if c.turn_noise else 0.0
+        speed = length(truth.velocity[f, p, 0], truth.velocity[f, p, 1])
+        truth.yaw[f, p] = physics.turned_yaw(c, yaw, angle, speed, noise)
     elif kind == KICK:
-        _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor)
+        _kick(w, f, p, power, angle)
 
 
 @compiled
-def _kick(c, state, m, acceleration, f, p, power, angle, uniforms, cursor):
-    ball = c.num_keepers + c.num_takers
-    rel_x = state.position[f, ball, 0] - state.position[f, p, 0]
-    rel_y = state.position[f, ball, 1] - state.position[f, p, 1]
+def _kick(w, f, p, power, angle):
+    """The server lets player p kick the ball if it is in reach."""
+    c, truth, ball = w.constants, w.truth, w.ball
+    rel_x = truth.position[f, ball, 0] - truth.position[f, p, 0]
+    rel_y = truth.position[f, ball, 1] - truth.position[f, p, 1]
     if length(rel_x, rel_y) > c.kickable_distance:
         return
-    m.kicked[f, p] = True
-    yaw = state.yaw[f, p]
+    w.memory.kicked[f, p] = True
+    acceleration, yaw = w.scratch.acceleration, truth.yaw[f, p]
     ax, ay = physics.kick_acceleration(c, power, angle, rel_x, rel_y, yaw)
     acceleration[ball, 0] += ax
     acceleration[ball, 1] += ay
     if c.kick_rand > 0.0:
-        speed = length(state.velocity[f, ball, 0], state.velocity[f, ball, 1])
+        speed = length(truth.velocity[f, ball, 0], truth.velocity[f, ball, 1])
         largest = physics.kick_noise_radius(c, power, rel_x, rel_y, yaw, speed)
-        radius = largest * draw(uniforms, cursor, f)
-        direction = TWO_PI * draw(uniforms, cursor, f)
+        radius = largest * draw(w.random, f)
+        direction = TWO_PI * draw(w.random, f)
         acceleration[ball, 0] += radius * math.cos(direction)
         acceleration[ball, 1] += radius * math.sin(direction)
 
 
 @compiled
-def _velocity(c, state, acceleration, f, o, uniforms, cursor):
-    vx, vy = state.velocity[f, o]
-    ax, ay = acceleration[o]
-    if o == c.num_keepers + c.num_takers:
+def _set_off(w, f, o):
+    """Object o's velocity of this cycle, and its disc as pymunk is to move it."""
+    truth, motion, place = w.truth, w.bodies.motion, w.bodies.place
+    vx, vy = truth.velocity[f, o]
+    ax, ay = w.scratch.acceleration[o]
+    vx, vy = physics.moved_velocity(vx, vy, ax, ay, _limits(w, o), w.random, f)
+    truth.velocity[f, o, 0], truth.velocity[f, o, 1] = vx, vy
+    motion[f, o, 0] = truth.position[f, o, 0] + place[f, 0]
+    motion[f, o, 1] = truth.position[f, o, 1] + place[f, 1]
+    motion[f, o, 2], motion[f, o, 3] = vx, vy
+
+
+@compiled
+def _limits(w, o):
+    """How object o may move."""
+    c = w.constants
+    if o == w.ball:
         rand = c.ball_rand if c.movement_noise else 0.0
-        return physics.moved_velocity(
-            vx, vy, ax, ay, c.ball_accel_max, c.ball_speed_max, rand, uniforms, cursor, f
-        )
+        return physics.Limits(c.ball_accel_max, c.ball_speed_max, rand)
     rand = c.player_rand if c.movement_noise else 0.0
-    return physics.moved_velocity(
-        vx, vy, ax, ay, c.player_accel_max, c.player_speed_max, rand, uniforms, cursor, f
-    )
+    return physics.Limits(c.player_accel_max, c.player_speed_max, rand)
 
 
 @compiled_apart
-def settle(c, state, s, m, speech, motion, place, radius, touched, scratch, uniforms, cursor):
-    """After the discs moved: collisions, referee, and what the players perceive of it."""
-    num = c.num_keepers + c.num_takers
-    for f in range(len(state.running)):
-        if not state.running[f]:
+def settle(w, playing):
+    """After the discs moved: collisions, referee, and what the players perceive of it.
+
+    Args:
+        w: Fields.
+        playing: (num_fields,) bool, as `act` had it.
+    """
+    for f in range(len(playing)):
+        if not (playing[f] and w.truth.running[f]):
             continue
-        state.time[f] += 1
-        if s.outcome[f] != _IN_PLAY:
-            _kick_off(c, state, s, m, speech, uniforms, cursor, f)
+        w.truth.time[f] += 1
+        if w.belief.outcome[f] != _IN_PLAY:
+            _kick_off(w, f)
             continue
-        for o in range(num + 1):
-            decay = c.ball_decay if o == num else c.player_decay
-            for axis in range(2):
-                state.position[f, o, axis] = motion[f, o, axis] - place[f, axis]
-                state.velocity[f, o, axis] = physics.on_grid(decay * state.velocity[f, o, axis])
-        if touched[f]:
-            physics.separate(state.position[f], state.velocity[f], radius, *scratch)
-        s.cycle[f] += 1
-        keeper = referee.near_ball(c, state.position[f], 0, c.num_keepers)
-        taker = referee.near_ball(c, state.position[f], c.num_keepers, num)
-        if keeper >= 0:
-            state.last_keeper[f] = keeper
-        count = state.take_count[f]
-        s.outcome[f] = referee.outcome(c, state.position[f], count)
-        if s.outcome[f] == _IN_PLAY:
-            state.take_count[f] = referee.next_take_count(count, keeper >= 0, taker >= 0)
-        _perceive(c, state, s, m, speech, uniforms, cursor, f)
+        _come_to_rest(w, f)
+        _judge_ball(w, f)
+        _perceive(w, f)
 
 
 @compiled
-def _perceive(c, state, s, m, speech, uniforms, cursor, f):
-    position, velocity, yaw = state.position[f], state.velocity[f], state.yaw[f]
-    for p in range(c.num_keepers + c.num_takers):
-        if s.cycle[f] > 0:
-            remember(c, s, m, f, p)
-        feel_self(c, s, m, position, velocity, f, p)
-        if c.hearing:
-            hear(c, s, speech, f, p, uniforms, cursor)
-        if sight.looks_now(c, m, f, p, state.time[f]):
-            sight.look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor)
-        _judge(c, s, m, f, p)
+def _come_to_rest(w, f):
+    """Take over where pymunk moved the discs of field f, and part those that overlap."""
+    c, truth, motion, place = w.constants, w.truth, w.bodies.motion, w.bodies.place
+    for o in range(w.ball + 1):
+        decay = c.ball_decay if o == w.ball else c.player_decay
+        for axis in range(2):
+            truth.position[f, o, axis] = motion[f, o, axis] - place[f, axis]
+            truth.velocity[f, o, axis] = physics.on_grid(decay * truth.velocity[f, o, axis])
+    if w.bodies.touched[f]:
+        physics.separate(truth.position[f], truth.velocity[f], w.bodies.radius, w.scratch)
 
 
 @compiled
-def _judge(c, s, m, f, p):
+def _judge_ball(w, f):
+    """The referee's look at field f: who controls the ball, is the episode over?"""
+    c, truth, belief = w.constants, w.truth, w.belief
+    belief.cycle[f] += 1
+    keeper = referee.near_ball(c, truth.position[f], 0, c.num_keepers)
+    taker = referee.near_ball(c, truth.position[f], c.num_keepers, w.num_players)
+    if keeper >= 0:
+        truth.last_keeper[f] = keeper
+    count = truth.take_count[f]
+    belief.outcome[f] = referee.outcome(c, truth.position[f], count)
+    if belief.outcome[f] == _IN_PLAY:
+        truth.take_count[f] = referee.next_take_count(count, keeper >= 0, taker >= 0)
+
+
+@compiled
+def _perceive(w, f):
+    """What every player of field f makes of this cycle."""
+    for p in range(w.num_players):
+        if w.belief.cycle[f] > 0:
+            remember(w, f, p)
+        feel_self(w, f, p)
+        if w.constants.hearing:
+            hear(w, f, p)
+        if sight.looks_now(w, f, p):
+            sight.look(w, f, p)
+        _judge(w, f, p)
+
+
+@compiled
+def _judge(w, f, p):
     """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
-    num = c.num_keepers + c.num_takers
-    ball = s.position[f, p, num]
-    known = s.age[f, p, num] <= c.ball_lost_age
-    own = s.position[f, p, p]
+    c, belief, memory = w.constants, w.belief, w.memory
+    ball = belief.position[f, p, w.ball]
+    known = belief.age[f, p, w.ball] <= c.ball_lost_age
+    own = belief.position[f, p, p]
     near = length(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
-    s.ball_kickable[f, p] = known and near
-    s.cycles_to_ball[f, p, :] = NEVER
-    if s.ball_kickable[f, p]:
-        s.cycles_to_ball[f, p, p] = 0
+    belief.ball_kickable[f, p] = known and near
+    belief.cycles_to_ball[f, p, :] = NEVER
+    if belief.ball_kickable[f, p]:
+        belief.cycles_to_ball[f, p, p] = 0
     elif known and p < c.num_keepers:
-        _find_fastest_keeper(c, s, m, f, p)
-    passing = m.pass_cycle[f, p] == s.cycle[f] - 1 and s.ball_kickable[f, p]
-    s.decision_due[f, p] = s.outcome[f] == _IN_PLAY and not passing
+        _find_fastest_keeper(w, f, p)
+    passing = memory.pass_cycle[f, p] == belief.cycle[f] - 1 and belief.ball_kickable[f, p]
+    belief.decision_due[f, p] = belief.outcome[f] == _IN_PLAY and not passing
 
 
 @compiled
-def _find_fastest_keeper(c, s, m, f, p):
+def _find_fastest_keeper(w, f, p):
     """Which keeper reaches the ball first, as player p believes, and when (equal ones all count).
 
     Begins with the keeper nearest to the ball, so that most others are soon seen to be slower.
     """
-    ball = c.num_keepers + c.num_takers
-    nearest = tactics.nearest_to_ball(c, s, f, p, 0, c.num_keepers)
+    c, belief, memory = w.constants, w.belief, w.memory
+    nearest = tactics.nearest_to_ball(w, f, p, 0, c.num_keepers)
+    ball = ball_of(w, f, p)
     fastest = 2 * c.intercept_horizon - 1
     for k in range(c.num_keepers):
         j = (nearest + k) % c.num_keepers
-        if j != p and s.age[f, p, j] > c.player_lost_age:
+        if j != p and belief.age[f, p, j] > c.player_lost_age:
             continue
-        x, y = s.position[f, p, j]
-        vx, vy = s.velocity[f, p, j]
-        ux, uy = math.cos(s.body[f, p, j]), math.sin(s.body[f, p, j])
-        if j != p and s.cycle[f] - m.motion_cycle[f, p, j] > LATELY:
-            vx, vy, ux, uy = UNKNOWN_SPEED, 0.0, 0.0, 0.0
-        place, motion = s.position[f, p, ball], s.velocity[f, p, ball]
-        cycles = cycles_to_ball(c, x, y, vx, vy, ux, uy, place, motion, fastest)
+        body = body_of(w, f, p, j)
+        if j != p and belief.cycle[f] - memory.motion_cycle[f, p, j] > LATELY:
+            body = Body(body.x, body.y, UNKNOWN_SPEED, 0.0, 0.0, 0.0)
+        cycles = cycles_to_ball(c, body, ball, fastest)
         if cycles < fastest:
             fastest = cycles
-            s.cycles_to_ball[f, p, :] = NEVER
-        s.cycles_to_ball[f, p, j] = cycles
+            belief.cycles_to_ball[f, p, :] = NEVER
+        belief.cycles_to_ball[f, p, j] = cycles

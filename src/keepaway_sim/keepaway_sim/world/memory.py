@@ -22,45 +22,47 @@ def same_team(c, p, q):
 
 
 @compiled
-def forget(c, s, m, f, p, uniforms, cursor):
+def forget(w, f, p):
     """A new episode: player p has seen nothing of it yet and gets a new phase of looking."""
-    num = c.num_keepers + c.num_takers
+    c, belief, memory = w.constants, w.belief, w.memory
+    num = w.num_players
     for j in range(num + 1):
-        s.age[f, p, j] = NEVER
-        s.velocity[f, p, j, 0] = 0.0
-        s.velocity[f, p, j, 1] = 0.0
-    m.motion_cycle[f, p, :] = -NEVER
-    m.turned[f, p] = 0.0
-    m.kicked[f, p] = False
-    m.pass_cycle[f, p] = -2
-    m.intercept_cycle[f, p] = -10
-    m.search_cycle[f, p] = -10
-    m.vain_dashes[f, p] = 0
-    m.look_phase[f, p] = int(draw(uniforms, cursor, f) * c.look_period)
+        belief.age[f, p, j] = NEVER
+        belief.velocity[f, p, j, 0] = 0.0
+        belief.velocity[f, p, j, 1] = 0.0
+    memory.motion_cycle[f, p, :] = -NEVER
+    memory.turned[f, p] = 0.0
+    memory.kicked[f, p] = False
+    memory.pass_cycle[f, p] = -2
+    memory.intercept_cycle[f, p] = -10
+    memory.search_cycle[f, p] = -10
+    memory.vain_dashes[f, p] = 0
+    memory.look_phase[f, p] = int(draw(w.random, f) * c.look_period)
 
 
 @compiled
-def remember(c, s, m, f, p):
+def remember(w, f, p):
     """Carry player p's belief about all others one cycle on, before anything new is known."""
-    num = c.num_keepers + c.num_takers
-    position, velocity = s.position[f, p], s.velocity[f, p]
-    ball, kicked = num, m.kicked[f, p]
+    c, belief, memory = w.constants, w.belief, w.memory
+    num = w.num_players
+    position, velocity = belief.position[f, p], belief.velocity[f, p]
+    ball, kicked = num, memory.kicked[f, p]
     if kicked:
         ax, ay = kick_acceleration(
             c,
-            m.command[f, p, 1],
-            m.command[f, p, 2],
+            memory.command[f, p, 1],
+            memory.command[f, p, 2],
             position[ball, 0] - position[p, 0],
             position[ball, 1] - position[p, 1],
-            s.body[f, p, p],
+            belief.body[f, p, p],
         )
         vx, vy = limited(velocity[ball, 0] + ax, velocity[ball, 1] + ay, c.ball_speed_max)
         velocity[ball, 0], velocity[ball, 1] = vx, vy
-    s.body[f, p, p] = wrap(s.body[f, p, p] + m.turned[f, p])
+    belief.body[f, p, p] = wrap(belief.body[f, p, p] + memory.turned[f, p])
     for j in range(num + 1):
-        if s.age[f, p, j] < NEVER:
-            s.age[f, p, j] += 1
-    chaser = _nearest_opponent_to_ball(c, s, f, p)
+        if belief.age[f, p, j] < NEVER:
+            belief.age[f, p, j] += 1
+    chaser = _nearest_opponent_to_ball(w, f, p)
     for j in range(num):
         if j == p:
             continue
@@ -81,32 +83,34 @@ def remember(c, s, m, f, p):
     velocity[ball, 0] *= c.ball_decay
     velocity[ball, 1] *= c.ball_decay
     if not kicked:
-        stop_ball_of_opponent(c, s, f, p)
+        stop_ball_of_opponent(w, f, p)
 
 
 @compiled
-def stop_ball_of_opponent(c, s, f, p):
+def stop_ball_of_opponent(w, f, p):
     """P: a ball within an opponent's reach is believed to lie still; nobody knows his plans."""
-    ball = c.num_keepers + c.num_takers
-    opponent = _nearest_opponent_to_ball(c, s, f, p)
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    opponent = _nearest_opponent_to_ball(w, f, p)
     if opponent < 0:
         return
-    dx = s.position[f, p, ball, 0] - s.position[f, p, opponent, 0]
-    dy = s.position[f, p, ball, 1] - s.position[f, p, opponent, 1]
+    dx = belief.position[f, p, ball, 0] - belief.position[f, p, opponent, 0]
+    dy = belief.position[f, p, ball, 1] - belief.position[f, p, opponent, 1]
     if length(dx, dy) < c.kickable_distance:
-        s.velocity[f, p, ball, 0] = 0.0
-        s.velocity[f, p, ball, 1] = 0.0
+        belief.velocity[f, p, ball, 0] = 0.0
+        belief.velocity[f, p, ball, 1] = 0.0
 
 
 @compiled
-def _nearest_opponent_to_ball(c, s, f, p):
-    num = c.num_keepers + c.num_takers
+def _nearest_opponent_to_ball(w, f, p):
+    c, belief = w.constants, w.belief
+    num = w.num_players
     nearest, best = -1, math.inf
     for j in range(num):
-        if same_team(c, p, j) or s.age[f, p, j] > c.player_lost_age:
+        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
             continue
-        dx = s.position[f, p, j, 0] - s.position[f, p, num, 0]
-        dy = s.position[f, p, j, 1] - s.position[f, p, num, 1]
+        dx = belief.position[f, p, j, 0] - belief.position[f, p, num, 0]
+        dy = belief.position[f, p, j, 1] - belief.position[f, p, num, 1]
         distance = dx * dx + dy * dy
         if distance < best:
             nearest, best = j, distance
@@ -114,36 +118,40 @@ def _nearest_opponent_to_ball(c, s, f, p):
 
 
 @compiled
-def feel_self(c, s, m, position, velocity, f, p):
+def feel_self(w, f, p):
     """Own position and speed as the body feels them, nearly exact; a bump shows in the speed."""
-    ux, uy = _expected_own_velocity(c, s, m, f, p)
-    s.position[f, p, p, 0] = position[p, 0] + m.self_error[f, p, 0]
-    s.position[f, p, p, 1] = position[p, 1] + m.self_error[f, p, 1]
+    c, belief, memory = w.constants, w.belief, w.memory
+    position, velocity = w.truth.position[f], w.truth.velocity[f]
+    ux, uy = _expected_own_velocity(w, f, p)
+    belief.position[f, p, p, 0] = position[p, 0] + memory.self_error[f, p, 0]
+    belief.position[f, p, p, 1] = position[p, 1] + memory.self_error[f, p, 1]
     speed = length(velocity[p, 0], velocity[p, 1])
     share = quantize(speed, c.speed_step) / speed if speed > 0.0 else 0.0
     vx, vy = share * velocity[p, 0], share * velocity[p, 1]
-    s.velocity[f, p, p, 0], s.velocity[f, p, p, 1] = vx, vy
-    s.age[f, p, p] = 0
-    if s.cycle[f] > 0 and _seems_bumped(c, s, f, p, vx, vy, ux, uy):
-        _bump_ball(c, s, f, p)
+    belief.velocity[f, p, p, 0], belief.velocity[f, p, p, 1] = vx, vy
+    belief.age[f, p, p] = 0
+    if belief.cycle[f] > 0 and _seems_bumped(w, f, p, vx, vy, ux, uy):
+        _bump_ball(w, f, p)
 
 
 @compiled
-def _expected_own_velocity(c, s, m, f, p):
+def _expected_own_velocity(w, f, p):
     """Velocity that player p expects of its last command, before it feels the real one."""
-    vx, vy = s.velocity[f, p, p]
-    if m.command[f, p, 0] == DASH:
-        ax, ay = dash_acceleration(c, m.command[f, p, 1], s.body[f, p, p])
+    c, belief, memory = w.constants, w.belief, w.memory
+    vx, vy = belief.velocity[f, p, p]
+    if memory.command[f, p, 0] == DASH:
+        ax, ay = dash_acceleration(c, memory.command[f, p, 1], belief.body[f, p, p])
         vx, vy = limited(vx + ax, vy + ay, c.player_speed_max)
     return c.player_decay * vx, c.player_decay * vy
 
 
 @compiled
-def _seems_bumped(c, s, f, p, vx, vy, ux, uy):
+def _seems_bumped(w, f, p, vx, vy, ux, uy):
     """P: does felt velocity (vx, vy) against the expected (ux, uy) mean a bump into the ball?"""
-    ball = c.num_keepers + c.num_takers
-    own = s.position[f, p, p]
-    away = length(s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1])
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    own = belief.position[f, p, p]
+    away = length(belief.position[f, p, ball, 0] - own[0], belief.position[f, p, ball, 1] - own[1])
     felt, expected = length(vx, vy), length(ux, uy)
     if felt == 0.0:
         stopped = expected > 0.01 and away < 0.8
@@ -159,23 +167,24 @@ def _turned_round(felt, expected):
 
 
 @compiled
-def _bump_ball(c, s, f, p):
+def _bump_ball(w, f, p):
     """P: after a bump the ball is believed just before the body, its velocity reversed.
 
     Unless another player is believed nearer, who then was bumped into.
     """
-    ball = c.num_keepers + c.num_takers
-    own = s.position[f, p, p]
-    dx, dy = s.position[f, p, ball, 0] - own[0], s.position[f, p, ball, 1] - own[1]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    own = belief.position[f, p, p]
+    dx, dy = belief.position[f, p, ball, 0] - own[0], belief.position[f, p, ball, 1] - own[1]
     distance = length(dx, dy)
     for j in range(ball):
-        if j == p or s.age[f, p, j] > c.player_lost_age:
+        if j == p or belief.age[f, p, j] > c.player_lost_age:
             continue
-        away = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        away = length(belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1])
         if away < distance:
             return
     angle = math.atan2(dy, dx)
-    s.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * math.cos(angle)
-    s.position[f, p, ball, 1] = own[1] + BUMPED_DISTANCE * math.sin(angle)
-    s.velocity[f, p, ball, 0] *= -0.1
-    s.velocity[f, p, ball, 1] *= -0.1
+    belief.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * math.cos(angle)
+    belief.position[f, p, ball, 1] = own[1] + BUMPED_DISTANCE * math.sin(angle)
+    belief.velocity[f, p, ball, 0] *= -0.1
+    belief.velocity[f, p, ball, 1] *= -0.1

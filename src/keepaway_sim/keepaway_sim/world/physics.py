@@ -13,6 +13,7 @@ wherever it lies. The grid also absorbs the last bit in which processors' sines 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import TWO_PI, clip, length, wrap
@@ -89,25 +90,33 @@ def limited(x, y, largest):
     return x, y
 
 
+class Limits(NamedTuple):
+    """How an object may move."""
+
+    accel: float  # [m/cycle^2] at most
+    speed: float  # [m/cycle] at most
+    rand: float  # [1] of its speed: how far noise may reach
+
+
 @compiled
-def moved_velocity(vx, vy, ax, ay, accel_max, speed_max, rand, uniforms, cursor, stream):
+def moved_velocity(vx, vy, ax, ay, limits, draws, stream):
     """Velocity with which an object moves this cycle (S: object.cpp `_inc`).
 
     Acceleration and speed are limited, then noise polar(U(0, rand * speed), U(-pi, pi)) is
     added; two uniforms are read, none where nothing moves or rand is 0.
     """
-    ax, ay = limited(ax, ay, accel_max)
-    vx, vy = limited(vx + ax, vy + ay, speed_max)
-    if rand > 0.0 and (vx != 0.0 or vy != 0.0):
-        radius = rand * length(vx, vy) * draw(uniforms, cursor, stream)
-        angle = TWO_PI * draw(uniforms, cursor, stream)
+    ax, ay = limited(ax, ay, limits.accel)
+    vx, vy = limited(vx + ax, vy + ay, limits.speed)
+    if limits.rand > 0.0 and (vx != 0.0 or vy != 0.0):
+        radius = limits.rand * length(vx, vy) * draw(draws, stream)
+        angle = TWO_PI * draw(draws, stream)
         vx += radius * math.cos(angle)
         vy += radius * math.sin(angle)
     return on_grid(vx), on_grid(vy)
 
 
 @compiled
-def separate(position, velocity, radius, target, count, collided):
+def separate(position, velocity, radius, scratch):
     """Push overlapping discs of one field apart and reverse them, in place (S: stadium.cpp).
 
     Each overlapping pair is moved symmetrically about its midpoint to touching; a disc in
@@ -117,41 +126,54 @@ def separate(position, velocity, radius, target, count, collided):
     Args:
         position, velocity: (num_objects, 2) of one field.
         radius: (num_objects,) [m].
-        target, count, collided: (num_objects, 2), (num_objects,), (num_objects,), scratch.
+        scratch: Scratch.
     """
-    num = len(radius)
+    collided = scratch.collided
     collided[:] = False
     for _ in range(SWEEPS):
-        target[:] = 0.0
-        count[:] = 0.0
-        for i in range(num):
-            for j in range(i + 1, num):
-                dx = position[j, 0] - position[i, 0]
-                dy = position[j, 1] - position[i, 1]
-                touching = radius[i] + radius[j]
-                distance = length(dx, dy)
-                if distance >= touching - OVERLAP:
-                    continue
-                if distance > 0.0:
-                    dx, dy = dx / distance, dy / distance
-                else:
-                    dx, dy = 1.0, 0.0
-                middle_x = 0.5 * (position[i, 0] + position[j, 0])
-                middle_y = 0.5 * (position[i, 1] + position[j, 1])
-                for k, side in ((i, -0.5), (j, 0.5)):
-                    target[k, 0] += middle_x + side * touching * dx
-                    target[k, 1] += middle_y + side * touching * dy
-                    count[k] += 1.0
-        clear = True
-        for k in range(num):
-            if count[k] > 0.0:
-                clear = False
-                collided[k] = True
-                position[k, 0] = on_grid(target[k, 0] / count[k])
-                position[k, 1] = on_grid(target[k, 1] / count[k])
-        if clear:
+        scratch.pushed_to[:] = 0.0
+        scratch.num_pushes[:] = 0.0
+        for i in range(len(radius)):
+            for j in range(i + 1, len(radius)):
+                _push_apart(position, radius, i, j, scratch)
+        if not _take_places(position, scratch):
             break
-    for k in range(num):
+    for k in range(len(radius)):
         if collided[k]:
             velocity[k, 0] = on_grid(BOUNCE * velocity[k, 0])
             velocity[k, 1] = on_grid(BOUNCE * velocity[k, 1])
+
+
+@compiled
+def _push_apart(position, radius, i, j, scratch):
+    """Add to the pushes of two discs where they would have to go; nothing if they are apart."""
+    dx = position[j, 0] - position[i, 0]
+    dy = position[j, 1] - position[i, 1]
+    touching = radius[i] + radius[j]
+    distance = length(dx, dy)
+    if distance >= touching - OVERLAP:
+        return
+    if distance > 0.0:
+        dx, dy = dx / distance, dy / distance
+    else:
+        dx, dy = 1.0, 0.0
+    middle_x = 0.5 * (position[i, 0] + position[j, 0])
+    middle_y = 0.5 * (position[i, 1] + position[j, 1])
+    for k, side in ((i, -0.5), (j, 0.5)):
+        scratch.pushed_to[k, 0] += middle_x + side * touching * dx
+        scratch.pushed_to[k, 1] += middle_y + side * touching * dy
+        scratch.num_pushes[k] += 1.0
+
+
+@compiled
+def _take_places(position, scratch):
+    """Put every pushed disc on the mean of its places. Was there any?"""
+    pushed = False
+    for k in range(len(position)):
+        count = scratch.num_pushes[k]
+        if count > 0.0:
+            pushed = True
+            scratch.collided[k] = True
+            position[k, 0] = on_grid(scratch.pushed_to[k, 0] / count)
+            position[k, 1] = on_grid(scratch.pushed_to[k, 1] / count)
+    return pushed

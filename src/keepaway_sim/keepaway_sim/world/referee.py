@@ -18,20 +18,18 @@ _OUT_OF_BOUNDS = int(Outcome.OUT_OF_BOUNDS)
 
 
 @compiled
-def kick_off(c, position, velocity, uniforms, cursor, stream):
-    """Put players and ball of one field on their starting places, in place.
+def kick_off(w, f):
+    """Put players and ball of field f on their starting places.
 
     A random cyclic offset decides which keeper stands where: three corners, the rest near the
     centre. The takers share the corner (-x, +y). Body directions are kept, as in the server.
-
-    Args:
-        position, velocity: (num_objects, 2) of one field; the ball is last.
     """
+    c, position = w.constants, w.truth.position[f]
     half_x, half_y = c.field_length / 2.0, c.field_width / 2.0
-    offset = int(draw(uniforms, cursor, stream) * c.num_keepers)
+    offset = int(draw(w.random, f) * c.num_keepers)
     for k in range(c.num_keepers):
         slot = (k + offset) % c.num_keepers
-        u, v = draw(uniforms, cursor, stream), draw(uniforms, cursor, stream)
+        u, v = draw(w.random, f), draw(w.random, f)
         if slot < 3:
             side_x = -1.0 if slot == 0 else 1.0
             side_y = 1.0 if slot == 2 else -1.0
@@ -40,14 +38,13 @@ def kick_off(c, position, velocity, uniforms, cursor, stream):
         else:
             x, y = 2.0 * u - 1.0, 2.0 * v - 1.0
         position[k, 0], position[k, 1] = on_grid(x), on_grid(y)
-    num_players = c.num_keepers + c.num_takers
-    for t in range(c.num_keepers, num_players):
-        u, v = draw(uniforms, cursor, stream), draw(uniforms, cursor, stream)
+    for t in range(c.num_keepers, w.num_players):
+        u, v = draw(w.random, f), draw(w.random, f)
         position[t, 0] = on_grid(-half_x + CORNER_JITTER * u)
         position[t, 1] = on_grid(half_y - CORNER_JITTER * v)
-    position[num_players, 0] = -half_x + BALL_INSET
-    position[num_players, 1] = -half_y + BALL_INSET
-    velocity[:] = 0.0
+    position[w.ball, 0] = -half_x + BALL_INSET
+    position[w.ball, 1] = -half_y + BALL_INSET
+    w.truth.velocity[f, :, :] = 0.0
 
 
 @compiled

@@ -14,6 +14,7 @@ the distance at which numbers are readable are not confused with each other.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER, SIGHT_CELLS
@@ -26,28 +27,34 @@ DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is 
 
 
 @compiled
-def looks_now(c, m, f, p, time):
+def looks_now(w, f, p):
     """Does player p see something new in this cycle of its field's life?"""
-    return c.look_period == 1 or (time + m.look_phase[f, p]) % c.look_period != c.look_period - 1
+    period, moment = w.constants.look_period, w.truth.time[f] + w.memory.look_phase[f, p]
+    return period == 1 or moment % period != period - 1
+
+
+class Glimpse(NamedTuple):
+    """What a player gets of an object it sees or only feels."""
+
+    dx: float  # true unit vector from the player to the object
+    dy: float
+    distance: float  # [m] true
+    ux: float  # the unit vector as the player believes it
+    uy: float
+    seen: bool
+    moves: bool  # is it seen how it moves?
 
 
 @compiled
-def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
-    """Player p sees its surroundings (truth: one field's arrays) and updates its belief."""
-    num = c.num_keepers + c.num_takers
-    if c.self_position_error > 0.0:
-        for axis in range(2):
-            error = (2.0 * draw(uniforms, cursor, f) - 1.0) * c.self_position_error
-            m.self_error[f, p, axis] = error
-            s.position[f, p, p, axis] = position[p, axis] + error
-    yaw_error = 0.0
-    if c.self_yaw_error > 0.0:
-        yaw_error = (2.0 * draw(uniforms, cursor, f) - 1.0) * c.self_yaw_error
-    s.body[f, p, p] = wrap(yaw[p] + yaw_error)
-    face = yaw[p] + s.neck[f, p]
+def look(w, f, p):
+    """Player p sees its surroundings and updates its belief."""
+    c, belief, memory = w.constants, w.belief, w.memory
+    position, yaw = w.truth.position[f], w.truth.yaw[f]
+    yaw_error = _look_at_self(w, f, p)
+    face = yaw[p] + belief.neck[f, p]
     error = math.cos(yaw_error), math.sin(yaw_error)
     believed_face = math.cos(face + yaw_error), math.sin(face + yaw_error)
-    for j in range(num + 1):
+    for j in range(w.ball + 1):
         if j == p:
             continue
         dx, dy = position[j, 0] - position[p, 0], position[j, 1] - position[p, 1]
@@ -55,74 +62,91 @@ def look(c, s, m, position, velocity, yaw, f, p, uniforms, cursor):
         dx, dy = dx / distance, dy / distance
         direction = wrap(bearing(dx, dy) - face)
         seen = abs(direction) <= 0.5 * c.visible_angle
-        if not seen and (distance > c.feel_distance or _is_nameless(c, s, f, p, j)):
-            _forget_ghost(c, s, f, p, j)
+        if not seen and (distance > c.feel_distance or _is_nameless(w, f, p, j)):
+            _forget_ghost(w, f, p, j)
             continue
         if c.direction_step == 0.0:
             ux, uy = rotated(dx, dy, *error)
         else:
             step = round(direction / c.direction_step) + len(c.direction_cosine) // 2
             ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
-        moves = seen and _velocity_visible(c, distance, uniforms, cursor, f)
-        _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, moves)
-        if seen and j < num:
-            s.body[f, p, j] = wrap(yaw[j] + yaw_error)
+        moves = seen and _velocity_visible(w, f, distance)
+        _see(w, f, p, j, Glimpse(dx, dy, distance, ux, uy, seen, moves))
+        if seen and j < w.ball:
+            belief.body[f, p, j] = wrap(yaw[j] + yaw_error)
             if moves:
-                m.motion_cycle[f, p, j] = s.cycle[f]
-    own, ball = s.position[f, p, p], s.position[f, p, num]
+                memory.motion_cycle[f, p, j] = belief.cycle[f]
+    own, ball = belief.position[f, p, p], belief.position[f, p, w.ball]
     if length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
-        stop_ball_of_opponent(c, s, f, p)
+        stop_ball_of_opponent(w, f, p)
 
 
 @compiled
-def _is_nameless(c, s, f, p, j):
+def _look_at_self(w, f, p):
+    """Player p finds out where it is and faces; gives the error of its body direction [rad]."""
+    c, truth, belief = w.constants, w.truth, w.belief
+    if c.self_position_error > 0.0:
+        for axis in range(2):
+            error = (2.0 * draw(w.random, f) - 1.0) * c.self_position_error
+            w.memory.self_error[f, p, axis] = error
+            belief.position[f, p, p, axis] = truth.position[f, p, axis] + error
+    yaw_error = 0.0
+    if c.self_yaw_error > 0.0:
+        yaw_error = (2.0 * draw(w.random, f) - 1.0) * c.self_yaw_error
+    belief.body[f, p, p] = wrap(truth.yaw[f, p] + yaw_error)
+    return yaw_error
+
+
+@compiled
+def _is_nameless(w, f, p, j):
     """S: who is only felt is no more than a player; P: it is taken for the one expected there."""
-    return j < c.num_keepers + c.num_takers and s.age[f, p, j] > c.player_lost_age
+    c, belief = w.constants, w.belief
+    return j < w.num_players and belief.age[f, p, j] > c.player_lost_age
 
 
 @compiled
-def _forget_ghost(c, s, f, p, j):
+def _forget_ghost(w, f, p, j):
     """P removeGhosts: what is not where it must be seen is not known any more."""
-    own = s.position[f, p, p]
-    dx, dy = s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1]
-    direction = wrap(bearing(dx, dy) - s.body[f, p, p] - s.neck[f, p])
+    c, belief = w.constants, w.belief
+    own = belief.position[f, p, p]
+    dx, dy = belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1]
+    direction = wrap(bearing(dx, dy) - belief.body[f, p, p] - belief.neck[f, p])
     if abs(direction) < 0.5 * c.visible_angle - GHOST_MARGIN:
-        s.age[f, p, j] = NEVER
+        belief.age[f, p, j] = NEVER
 
 
 @compiled
-def _see(c, s, velocity, f, p, j, dx, dy, distance, ux, uy, seen, moves):
-    """Object j as seen or only felt by player p.
+def _see(w, f, p, j, glimpse):
+    """What player p makes of its Glimpse of object j."""
+    c, belief = w.constants, w.belief
+    reported = _reported_distance(c, glimpse.distance)
+    fresh = belief.age[f, p, j] <= 1
+    old_x, old_y = belief.position[f, p, j, 0], belief.position[f, p, j, 1]
+    belief.position[f, p, j, 0] = belief.position[f, p, p, 0] + reported * glimpse.ux
+    belief.position[f, p, j, 1] = belief.position[f, p, p, 1] + reported * glimpse.uy
+    belief.age[f, p, j] = 0
+    if glimpse.moves:
+        _see_motion(w, f, p, j, glimpse, reported)
+    elif j == w.ball and fresh and not glimpse.seen:  # P: a felt ball's, from two positions
+        belief.velocity[f, p, j, 0] += (belief.position[f, p, j, 0] - old_x) * c.ball_decay
+        belief.velocity[f, p, j, 1] += (belief.position[f, p, j, 1] - old_y) * c.ball_decay
 
-    Args:
-        dx, dy, distance: unit vector to the object and how far it is [m].
-        ux, uy: the unit vector as player p believes it.
-        seen, moves: is it seen, and how it moves?
-    """
-    reported = _reported_distance(c, distance)
-    ball = c.num_keepers + c.num_takers
-    fresh = s.age[f, p, j] <= 1
-    old_x, old_y = s.position[f, p, j, 0], s.position[f, p, j, 1]
-    s.position[f, p, j, 0] = s.position[f, p, p, 0] + reported * ux
-    s.position[f, p, j, 1] = s.position[f, p, p, 1] + reported * uy
-    s.age[f, p, j] = 0
-    if not seen:
-        if j == ball and fresh:  # P: velocity of a felt ball from two positions
-            s.velocity[f, p, j, 0] += (s.position[f, p, j, 0] - old_x) * c.ball_decay
-            s.velocity[f, p, j, 1] += (s.position[f, p, j, 1] - old_y) * c.ball_decay
-        return
-    if not moves:
-        return
+
+@compiled
+def _see_motion(w, f, p, j, glimpse, reported):
+    """How object j moves, as player p sees it."""
+    c, belief, velocity = w.constants, w.belief, w.truth.velocity[f]
+    dx, dy, distance = glimpse.dx, glimpse.dy, glimpse.distance
     wx, wy = velocity[j, 0] - velocity[p, 0], velocity[j, 1] - velocity[p, 1]
     radial = reported * quantize((wx * dx + wy * dy) / distance, c.change_step)
     turning = (dx * wy - dy * wx) / distance
     if c.change_step > 0.0:
         turning = quantize(turning, DIRECTION_CHANGE_STEP)
-    rel_vx, rel_vy = rotated(radial, reported * turning, ux, uy)
+    rel_vx, rel_vy = rotated(radial, reported * turning, glimpse.ux, glimpse.uy)
     vx, vy = velocity[p, 0] + rel_vx, velocity[p, 1] + rel_vy
-    if j == ball:
-        vx, vy = _blended(c, vx, vy, s.velocity[f, p, j, 0], s.velocity[f, p, j, 1])
-    s.velocity[f, p, j, 0], s.velocity[f, p, j, 1] = vx, vy
+    if j == w.ball:
+        vx, vy = _blended(c, vx, vy, belief.velocity[f, p, j, 0], belief.velocity[f, p, j, 1])
+    belief.velocity[f, p, j, 0], belief.velocity[f, p, j, 1] = vx, vy
 
 
 @compiled
@@ -137,12 +161,13 @@ def _reported_distance(c, distance):
 
 
 @compiled
-def _velocity_visible(c, distance, uniforms, cursor, f):
+def _velocity_visible(w, f, distance):
     """Near objects show how they move; farther ones with falling probability."""
+    c = w.constants
     if distance <= c.certain_distance:
         return True
     share = (c.unsure_distance - distance) / (c.unsure_distance - c.certain_distance)
-    return draw(uniforms, cursor, f) < share
+    return draw(w.random, f) < share
 
 
 @compiled
@@ -155,8 +180,9 @@ def _blended(c, seen_x, seen_y, expected_x, expected_y):
 
 
 @compiled
-def turn_neck(c, s, f, p, x, y, turn):
+def turn_neck(w, f, p, x, y, turn):
     """Turn player p's neck toward a point, as far as it goes, after its body turned by `turn`."""
-    own = s.position[f, p, p]
-    wanted = wrap(math.atan2(y - own[1], x - own[0]) - s.body[f, p, p] - turn)
-    s.neck[f, p] = min(max(wanted, -0.25 * TWO_PI), 0.25 * TWO_PI)
+    belief = w.belief
+    own = belief.position[f, p, p]
+    wanted = wrap(math.atan2(y - own[1], x - own[0]) - belief.body[f, p, p] - turn)
+    belief.neck[f, p] = min(max(wanted, -0.25 * TWO_PI), 0.25 * TWO_PI)

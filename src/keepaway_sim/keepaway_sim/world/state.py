@@ -1,4 +1,10 @@
-"""Every array of the world: the truth, what players believe, say and remember."""
+"""Every array of the world: one record that compiled functions take whole.
+
+`Fields` holds what is fixed (constants), what is so (truth), what every player believes, remembers
+and says, the discs as pymunk takes them, the random numbers, and room to calculate in. Arrays begin
+with the axis of the fields (F), then that of the players (P); the ball is the object after the
+last player. No array of a record is ever replaced, only written into.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +13,38 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.world.config import NEVER
+from keepaway_sim.world.streams import Draws
 
 NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0  # kinds of commands
 
 
-OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
+class Command(NamedTuple):
+    """What a player does in a cycle."""
+
+    kind: float  # NONE, DASH, TURN or KICK
+    power: float  # of a dash or a kick
+    angle: float  # [rad] a turn's moment; a kick's direction, relative to the body
 
 
-class Perceptions(NamedTuple):
-    """What every player of every field believes; leading axes (num_fields, num_players).
+class Truth(NamedTuple):
+    """The truth of every field; the ball is the last object."""
 
-    The last axis but one of `position`, `velocity` and `age` counts objects: players in match
-    order, then the ball. Positions are in the field frame [m], velocities in m/cycle.
+    position: np.ndarray  # (F, P + 1, 2) [m]
+    velocity: np.ndarray  # (F, P + 1, 2) [m/cycle], after decay
+    yaw: np.ndarray  # (F, P) [rad] body directions
+    action: np.ndarray  # (F, P) int64, the action in force
+    target: np.ndarray  # (F, P) int64, its receiver or marked keeper
+    take_count: np.ndarray  # (F,) int64, the referee's counter
+    last_keeper: np.ndarray  # (F,) int64, keeper that controlled the ball last; -1 none
+    time: np.ndarray  # (F,) int64 [cycles] since the field was started
+    running: np.ndarray  # (F,) bool: started and not stopped
+
+
+class Belief(NamedTuple):
+    """What every player of every field believes.
+
+    The last axis but one of `position` and `velocity`, and the last of `age`, counts objects:
+    players in match order, then the ball. Positions are in the field frame.
     """
 
     position: np.ndarray  # (F, P, P + 1, 2) [m]
@@ -32,17 +58,6 @@ class Perceptions(NamedTuple):
     outcome: np.ndarray  # (F,) int8
     episode: np.ndarray  # (F,) int64, counted from 0
     cycle: np.ndarray  # (F,) int64 [cycles] since kick-off
-
-
-class Speech(NamedTuple):
-    """What every player says this cycle, heard by team-mates in the next."""
-
-    ball: np.ndarray  # (F, P, 4) x, y [m], vx, vy [m/cycle]
-    ball_age: np.ndarray  # (F, P) int32 [cycles]; -1: nothing said of the ball
-    opponent: np.ndarray  # (F, P) int32 player told of; -1: none
-    opponent_position: np.ndarray  # (F, P, 2) [m]
-    own: np.ndarray  # (F, P, 2) [m] own next position
-    own_said: np.ndarray  # (F, P) bool
 
 
 class Memory(NamedTuple):
@@ -61,15 +76,95 @@ class Memory(NamedTuple):
     vain_dashes: np.ndarray  # (F, P) int64 cycles in a row of dashing backward at rest
     search_cycle: np.ndarray  # (F, P) int64 last cycle of a search
     search_sign: np.ndarray  # (F, P) which way round
-    open_x: np.ndarray  # (25,) [m] the points where a keeper may get open
-    open_y: np.ndarray  # (25,) [m]
-    congestion: np.ndarray  # (25,) [1/m] scratch
 
 
-def make_perceptions(num_fields: int, num_players: int) -> Perceptions:
-    """Perceptions of players who know nothing yet."""
+class Speech(NamedTuple):
+    """What every player says this cycle, heard by team-mates in the next."""
+
+    ball: np.ndarray  # (F, P, 4) x, y [m], vx, vy [m/cycle]
+    ball_age: np.ndarray  # (F, P) int32 [cycles]; -1: nothing said of the ball
+    opponent: np.ndarray  # (F, P) int32 player told of; -1: none
+    opponent_position: np.ndarray  # (F, P, 2) [m]
+    own: np.ndarray  # (F, P, 2) [m] own next position
+    own_said: np.ndarray  # (F, P) bool
+
+
+class Discs(NamedTuple):
+    """Players and ball as pymunk takes them; made by `Bodies`."""
+
+    motion: np.ndarray  # (F, P + 1, 4) x, y [m] in the shared space, vx, vy [m/cycle]
+    place: np.ndarray  # (F, 2) [m] where each field's origin lies in the shared space
+    radius: np.ndarray  # (P + 1,) [m]
+    touched: np.ndarray  # (F,) bool: discs of the field may touch
+
+
+class Scratch(NamedTuple):
+    """Room to calculate in: nothing in it outlives the cycle of one field."""
+
+    acceleration: np.ndarray  # (P + 1, 2) [m/cycle^2]
+    pushed_to: np.ndarray  # (P + 1, 2) [m] sum of the places to which a disc is pushed
+    num_pushes: np.ndarray  # (P + 1,)
+    collided: np.ndarray  # (P + 1,) bool
+    congestion: np.ndarray  # (25,) [1/m] of the points where a keeper may get open
+
+
+class Fields(NamedTuple):
+    """All that compiled functions of the world work on."""
+
+    num_players: int
+    ball: int  # the ball's index among objects: it follows the last player
+    constants: Any  # of the task and its configuration, see `constants.pack`
+    truth: Truth
+    belief: Belief
+    memory: Memory
+    speech: Speech
+    bodies: Discs
+    random: Draws  # a stream for each field
+    scratch: Scratch
+
+
+def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
+    """Fields on which nothing has begun; as many as `bodies` has."""
+    num_fields, num_players = len(bodies.place), len(bodies.radius) - 1
     objects = num_players + 1
-    return Perceptions(
+    return Fields(
+        num_players=num_players,
+        ball=num_players,
+        constants=constants,
+        truth=_make_truth(num_fields, num_players),
+        belief=_make_belief(num_fields, num_players),
+        memory=_make_memory(num_fields, num_players),
+        speech=_make_speech(num_fields, num_players),
+        bodies=bodies,
+        random=random,
+        scratch=Scratch(
+            acceleration=np.zeros((objects, 2)),
+            pushed_to=np.zeros((objects, 2)),
+            num_pushes=np.zeros(objects),
+            collided=np.zeros(objects, dtype=np.bool_),
+            congestion=np.zeros(len(constants.open_x)),
+        ),
+    )
+
+
+def _make_truth(num_fields: int, num_players: int) -> Truth:
+    return Truth(
+        position=np.zeros((num_fields, num_players + 1, 2)),
+        velocity=np.zeros((num_fields, num_players + 1, 2)),
+        yaw=np.zeros((num_fields, num_players)),
+        action=np.zeros((num_fields, num_players), dtype=np.int64),
+        target=np.zeros((num_fields, num_players), dtype=np.int64),
+        take_count=np.zeros(num_fields, dtype=np.int64),
+        last_keeper=np.full(num_fields, -1, dtype=np.int64),
+        time=np.zeros(num_fields, dtype=np.int64),
+        running=np.zeros(num_fields, dtype=np.bool_),
+    )
+
+
+def _make_belief(num_fields: int, num_players: int) -> Belief:
+    """Belief of players who know nothing yet."""
+    objects = num_players + 1
+    return Belief(
         position=np.zeros((num_fields, num_players, objects, 2)),
         velocity=np.zeros((num_fields, num_players, objects, 2)),
         age=np.full((num_fields, num_players, objects), NEVER, dtype=np.int32),
@@ -84,24 +179,8 @@ def make_perceptions(num_fields: int, num_players: int) -> Perceptions:
     )
 
 
-def make_speech(num_fields: int, num_players: int) -> Speech:
-    """Speech of players who said nothing."""
-    shape = (num_fields, num_players)
-    return Speech(
-        ball=np.zeros((*shape, 4)),
-        ball_age=np.full(shape, -1, dtype=np.int32),
-        opponent=np.full(shape, -1, dtype=np.int32),
-        opponent_position=np.zeros((*shape, 2)),
-        own=np.zeros((*shape, 2)),
-        own_said=np.zeros(shape, dtype=np.bool_),
-    )
-
-
-def make_memory(c: Any, num_fields: int) -> Memory:
+def _make_memory(num_fields: int, num_players: int) -> Memory:
     """Memory of players before their first cycle."""
-    num_players = c.num_keepers + c.num_takers
-    share = np.linspace(-0.5, 0.5, OPEN_POINTS) * (1.0 - 2.0 * c.open_border)
-    open_x, open_y = np.meshgrid(c.field_length * share, -c.field_width * share, indexing="ij")
     shape = (num_fields, num_players)
     return Memory(
         self_error=np.zeros((*shape, 2)),
@@ -117,36 +196,17 @@ def make_memory(c: Any, num_fields: int) -> Memory:
         vain_dashes=np.zeros(shape, dtype=np.int64),
         search_cycle=np.full(shape, -10, dtype=np.int64),
         search_sign=np.ones(shape),
-        open_x=open_x.ravel(),
-        open_y=open_y.ravel(),
-        congestion=np.zeros(OPEN_POINTS**2),
     )
 
 
-class State(NamedTuple):
-    """The truth of every field; the ball is the last object."""
-
-    position: np.ndarray  # (F, P + 1, 2) [m]
-    velocity: np.ndarray  # (F, P + 1, 2) [m/cycle], after decay
-    yaw: np.ndarray  # (F, P) [rad] body directions
-    action: np.ndarray  # (F, P) int64, the action in force
-    target: np.ndarray  # (F, P) int64, its receiver or marked keeper
-    take_count: np.ndarray  # (F,) int64, the referee's counter
-    last_keeper: np.ndarray  # (F,) int64, keeper that controlled the ball last; -1 none
-    time: np.ndarray  # (F,) int64 [cycles] since the field was started
-    running: np.ndarray  # (F,) bool: started and not stopped
-
-
-def make_state(num_fields: int, num_players: int) -> State:
-    """Fields on which nothing has begun."""
-    return State(
-        position=np.zeros((num_fields, num_players + 1, 2)),
-        velocity=np.zeros((num_fields, num_players + 1, 2)),
-        yaw=np.zeros((num_fields, num_players)),
-        action=np.zeros((num_fields, num_players), dtype=np.int64),
-        target=np.zeros((num_fields, num_players), dtype=np.int64),
-        take_count=np.zeros(num_fields, dtype=np.int64),
-        last_keeper=np.full(num_fields, -1, dtype=np.int64),
-        time=np.zeros(num_fields, dtype=np.int64),
-        running=np.zeros(num_fields, dtype=np.bool_),
+def _make_speech(num_fields: int, num_players: int) -> Speech:
+    """Speech of players who said nothing."""
+    shape = (num_fields, num_players)
+    return Speech(
+        ball=np.zeros((*shape, 4)),
+        ball_age=np.full(shape, -1, dtype=np.int32),
+        opponent=np.full(shape, -1, dtype=np.int32),
+        opponent_position=np.zeros((*shape, 2)),
+        own=np.zeros((*shape, 2)),
+        own_said=np.zeros(shape, dtype=np.bool_),
     )

@@ -7,18 +7,34 @@ sizes do not matter, because `Generator.random(n)` is n times `Generator.random(
 
 from __future__ import annotations
 
+import copy
+from typing import NamedTuple
+
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.world.compiled import compiled
 
 
+class Draws(NamedTuple):
+    """Ready-made random numbers, as compiled functions take them."""
+
+    uniforms: np.ndarray  # (num_streams, block) in [0, 1)
+    cursor: np.ndarray  # (num_streams,) int64, the next unread one of each stream
+
+
+class StreamSnapshot(NamedTuple):
+    """Where a stream stands: what it gives from there on is fixed by it."""
+
+    generator: np.random.Generator | None  # a copy; None where the stream was never seeded
+    unread: np.ndarray  # uniforms drawn from it and not read yet
+
+
 class RandomStreams:
     """`num_streams` independent streams of uniforms in [0, 1).
 
     Attributes:
-        uniforms: (num_streams, block) float64, ready-made numbers.
-        cursor: (num_streams,) int64, the next unread one of each stream.
+        draws: the ready-made numbers (`Draws`).
     """
 
     def __init__(self, num_streams: int, reserve: int, block: int = 2048) -> None:
@@ -31,36 +47,53 @@ class RandomStreams:
         """
         if reserve > block:
             raise KeepawayError(f"reserve={reserve} is more than block={block}")
-        self.uniforms = np.empty((num_streams, block))
-        self.cursor = np.full(num_streams, block, dtype=np.int64)
+        self.draws = Draws(
+            np.zeros((num_streams, block)), np.full(num_streams, block, dtype=np.int64)
+        )
         self._reserve = reserve
         self._generators: list[np.random.Generator | None] = [None] * num_streams
 
     def seed(self, stream: int, generator: np.random.Generator) -> None:
         """Let a stream read from `generator` from now on."""
         self._generators[stream] = generator
-        generator.random(out=self.uniforms[stream])
-        self.cursor[stream] = 0
+        generator.random(out=self.draws.uniforms[stream])
+        self.draws.cursor[stream] = 0
 
     def refill(self) -> None:
         """Make sure that every seeded stream can give `reserve` more numbers."""
-        low = self.cursor > self.uniforms.shape[1] - self._reserve
+        low = self.draws.cursor > self.draws.uniforms.shape[1] - self._reserve
         if not low.any():
             return
         for stream in np.flatnonzero(low):
             generator = self._generators[stream]
             if generator is None:
                 continue
-            row, start = self.uniforms[stream], self.cursor[stream]
+            row, start = self.draws.uniforms[stream], self.draws.cursor[stream]
             left = len(row) - start
             row[:left] = row[start:].copy()
             generator.random(out=row[left:])
-            self.cursor[stream] = 0
+            self.draws.cursor[stream] = 0
+
+    def snapshot(self, stream: int) -> StreamSnapshot:
+        """Take down where a stream stands."""
+        unread = self.draws.uniforms[stream, self.draws.cursor[stream] :].copy()
+        return StreamSnapshot(copy.deepcopy(self._generators[stream]), unread)
+
+    def restore(self, stream: int, snapshot: StreamSnapshot) -> None:
+        """Let a stream give what it gave after `snapshot` was taken, here or elsewhere."""
+        generator = copy.deepcopy(snapshot.generator)
+        row, num_unread = self.draws.uniforms[stream], len(snapshot.unread)
+        if num_unread > len(row):
+            raise KeepawayError(f"a snapshot of {num_unread} numbers: there is room for {len(row)}")
+        self._generators[stream] = generator
+        start = len(row) - num_unread
+        row[start:] = snapshot.unread
+        self.draws.cursor[stream] = start
 
 
 @compiled
-def draw(uniforms, cursor, stream):
-    """The next uniform of a stream. Shapes: (num_streams, block), (num_streams,)."""
-    value = uniforms[stream, cursor[stream]]
-    cursor[stream] += 1
+def draw(draws, stream):
+    """The next uniform of a stream of `Draws`."""
+    value = draws.uniforms[stream, draws.cursor[stream]]
+    draws.cursor[stream] += 1
     return value

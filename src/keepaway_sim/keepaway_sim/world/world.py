@@ -6,17 +6,29 @@ node plays a World of one field, the trainer Worlds of hundreds; there is no oth
 
 from __future__ import annotations
 
+import functools
+from typing import NamedTuple
+
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
-from keepaway_sim.world import bodies, state
-from keepaway_sim.world.compiled import entry_point
+from keepaway_sim.world.bodies import Bodies
+from keepaway_sim.world.compiled import Kernel
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.cycle import act, settle, start
-from keepaway_sim.world.state import make_state
-from keepaway_sim.world.streams import RandomStreams
+from keepaway_sim.world.state import Belief, Truth, make_fields
+from keepaway_sim.world.streams import RandomStreams, StreamSnapshot
+
+
+class FieldSnapshot(NamedTuple):
+    """All there is of a field at one moment; see `World.snapshot`."""
+
+    task: Task
+    config: Config
+    rows: list[np.ndarray]  # of the arrays of `Fields`, positions relative to the field
+    random: StreamSnapshot
 
 
 class World:
@@ -24,8 +36,7 @@ class World:
 
     Attributes:
         task, config: what is played and how.
-        perceptions: what every player believes (`vision.Perceptions`), updated in place.
-        state: the truth (`State`), updated in place.
+        fields: every array of it (`Fields`), updated in place.
     """
 
     def __init__(self, task: Task, config: Config, num_fields: int = 1) -> None:
@@ -38,37 +49,30 @@ class World:
             raise KeepawayError(f"num_fields={num_fields}: give at least 1")
         self.task, self.config, self.num_fields = task, config, num_fields
         num = task.num_players
-        self._constants = pack(task, config)
-        self.perceptions = state.make_perceptions(num_fields, num)
-        self._memory = state.make_memory(self._constants, num_fields)
-        self._speech = state.make_speech(num_fields, num)
-        self.state = make_state(num_fields, num)
-        self._radius = np.full(num + 1, config.physics.player_size)
-        self._radius[num] = config.physics.ball_size
-        side = max(task.field_length, task.field_width)
-        self._bodies = bodies.Bodies(num_fields, self._radius, side)
+        radius = np.array([config.physics.player_size] * num + [config.physics.ball_size])
+        self._bodies = Bodies(num_fields, radius, max(task.field_length, task.field_width))
         self._streams = RandomStreams(num_fields, reserve=num * (num + 12) + 16)
-        self._touched = np.zeros(num_fields, dtype=np.bool_)
-        self._compile()
+        self.fields = make_fields(pack(task, config), self._bodies.discs, self._streams.draws)
+        self._everywhere = np.ones(num_fields, dtype=np.bool_)
+        self._start = Kernel(start, self.fields)
+        self._act, self._settle = Kernel(act, self.fields), Kernel(settle, self.fields)
+        self._act.compile_for(self._everywhere, self.truth.action, self.truth.target)
+        self._settle.compile_for(self._everywhere)
 
-    def _compile(self) -> None:
-        """Bring together what the compiled functions work on; no array is ever replaced."""
-        num = self.task.num_players
-        collide = np.zeros((num + 1, 2)), np.zeros(num + 1), np.zeros(num + 1, dtype=np.bool_)
-        world = self._constants, self.state, self.perceptions, self._memory, self._speech
-        places = self._bodies.motion, self._bodies.place
-        random = self._streams.uniforms, self._streams.cursor
-        self._for_start = *world, *random
-        self._for_act = *world, *places, collide[0], *random
-        self._for_settle = *world, *places, self._radius, self._touched, collide, *random
-        nothing = np.zeros((self.num_fields, num), dtype=np.int64)
-        self._act = entry_point(act, *self._for_act, nothing, nothing)
-        self._settle = entry_point(settle, *self._for_settle)
+    @property
+    def truth(self) -> Truth:
+        """What is so on every field, updated in place."""
+        return self.fields.truth
+
+    @property
+    def belief(self) -> Belief:
+        """What every player believes, updated in place."""
+        return self.fields.belief
 
     @property
     def commands(self) -> np.ndarray:
-        """(F, P, 3) every player's last command: kind (`vision.DASH` ..), power, angle [rad]."""
-        return self._memory.command
+        """(F, P, 3) every player's last command: kind (`state.DASH` ..), power, angle [rad]."""
+        return self.fields.memory.command
 
     def start(self, field: int, seed: np.random.SeedSequence) -> None:
         """Give a field a fresh trial with its own random numbers, and kick off.
@@ -76,23 +80,24 @@ class World:
         Raises:
             KeepawayError: no such field.
         """
-        if not 0 <= field < self.num_fields:
-            raise KeepawayError(f"field={field}: this world has fields 0..{self.num_fields - 1}")
+        self._check_field(field)
         self._streams.seed(field, np.random.default_rng(seed))
-        start(*self._for_start, field)
+        self._start(field)
 
     def stop(self, field: int) -> None:
         """Let a field rest: it is not simulated until it is started again."""
-        self.state.running[field] = False
-        self.perceptions.decision_due[field] = False
-        self._bodies.motion[field, :, 2:] = 0.0
+        self.truth.running[field] = False
+        self.belief.decision_due[field] = False
+        self.fields.bodies.motion[field, :, 2:] = 0.0
 
     def abort(self, field: int) -> None:
         """End a field's episode from outside; its next step kicks off a new one."""
-        self.perceptions.outcome[field] = Outcome.ABORTED
-        self.perceptions.decision_due[field] = False
+        self.belief.outcome[field] = Outcome.ABORTED
+        self.belief.decision_due[field] = False
 
-    def step(self, action: np.ndarray, target: np.ndarray) -> None:
+    def step(
+        self, action: np.ndarray, target: np.ndarray, playing: np.ndarray | None = None
+    ) -> None:
         """Play one cycle on every running field.
 
         Where a decision is due the request comes into force; elsewhere the last one holds. A
@@ -101,25 +106,70 @@ class World:
         Args:
             action, target: (num_fields, num_players) int64; `target` is the receiving or the
                 marked keeper's index, ignored for other actions.
+            playing: (num_fields,) bool, on which of the running fields; on all without it. On
+                the others time stands still.
 
         Raises:
             KeepawayError: a request that its player cannot carry out, or arrays of another
                 shape or kind; nothing was played.
         """
         action, target = self._checked(action), self._checked(target)
+        playing = self._everywhere if playing is None else np.ascontiguousarray(playing, np.bool_)
+        if playing.shape != self._everywhere.shape:
+            raise KeepawayError(f"playing of shape {playing.shape}: give {self._everywhere.shape}")
         self._streams.refill()
-        illegal = self._act(*self._for_act, action, target)
+        illegal = self._act(playing, action, target)
         if illegal >= 0:
             self._refuse(illegal, action, target)
-        touched = self._bodies.move()
-        self._touched[:] = False
-        self._touched[touched] = True
-        self._settle(*self._for_settle)
+        self._bodies.move()
+        self._settle(playing)
+
+    def snapshot(self, field: int) -> FieldSnapshot:
+        """Take down all there is of a field, random numbers included; it can be pickled.
+
+        Raises:
+            KeepawayError: no such field.
+        """
+        self._check_field(field)
+        rows = [array[field].copy() for array in self._arrays]
+        rows[-1][:, :2] -= self.fields.bodies.place[field]
+        return FieldSnapshot(self.task, self.config, rows, self._streams.snapshot(field))
+
+    def restore(self, field: int, snapshot: FieldSnapshot) -> None:
+        """Put a field back to where it was; from there the same requests give the same bits.
+
+        Args:
+            field: any of this world; it need not be the one that the snapshot is of.
+            snapshot: of this world or another one of the same task and configuration.
+
+        Raises:
+            KeepawayError: no such field, or a snapshot of another task or configuration.
+        """
+        self._check_field(field)
+        if (snapshot.task, snapshot.config) != (self.task, self.config):
+            raise KeepawayError(
+                f"a snapshot of another world ({snapshot.task}, {snapshot.config}):"
+                f" this one is {self.task}, {self.config}"
+            )
+        for array, row in zip(self._arrays, snapshot.rows, strict=True):
+            array[field] = row
+        self.fields.bodies.motion[field, :, :2] += self.fields.bodies.place[field]
+        self._streams.restore(field, snapshot.random)
+
+    @functools.cached_property
+    def _arrays(self) -> list[np.ndarray]:
+        """All arrays with a row for each field that outlive a cycle; the discs' motion is last."""
+        w = self.fields
+        return [*w.truth, *w.belief, *w.memory, *w.speech, w.bodies.motion]
+
+    def _check_field(self, field: int) -> None:
+        if not 0 <= field < self.num_fields:
+            raise KeepawayError(f"field={field}: this world has fields 0..{self.num_fields - 1}")
 
     def _checked(self, request: np.ndarray) -> np.ndarray:
         """The requests as the compiled code takes them."""
-        if request.shape != self.state.action.shape or request.dtype.kind not in "iu":
-            given, wanted = f"{request.shape} {request.dtype}", self.state.action.shape
+        if request.shape != self.truth.action.shape or request.dtype.kind not in "iu":
+            given, wanted = f"{request.shape} {request.dtype}", self.truth.action.shape
             raise KeepawayError(f"requests of shape {given}: give whole numbers of shape {wanted}")
         return np.ascontiguousarray(request, dtype=np.int64)
 

@@ -12,11 +12,12 @@ from keepaway_sim.task import Task
 from keepaway_sim.world.config import NEVER, profile
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.skills import prediction
+from keepaway_sim.world.skills.prediction import Ball, Body
 
 approx = pytest.approx
 
 C = pack(Task(), profile("2005"))
-ZERO = np.zeros(2)
+AT_REST = Body(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # at (0, 0), faces +x
 LIMIT = 2 * C.intercept_horizon - 1  # [cycles]
 
 
@@ -44,11 +45,10 @@ def test_moment_that_turns_a_moving_player(degrees, speed, moment):
     assert math.degrees(sent) == approx(moment)
 
 
-def heading(to, velocity=(0.0, 0.0), cycles=1, back=2.5):
+def heading(to, velocity=(0.0, 0.0), cycles=1):
     """(turns, direction after it [deg]) of a player at (0, 0) that faces +x."""
-    turns, ux, uy = prediction.heading_to_go(
-        C, 0.0, 0.0, *velocity, 1.0, 0.0, float(to[0]), float(to[1]), cycles, back
-    )
+    body = Body(0.0, 0.0, velocity[0], velocity[1], 1.0, 0.0)
+    turns, ux, uy = prediction.heading_to_go(C, body, float(to[0]), float(to[1]), cycles)
     return bool(turns), math.degrees(math.atan2(uy, ux))
 
 
@@ -93,24 +93,25 @@ def test_full_dashes_needed_straight_ahead(distance, speed, cycles):
 def test_a_turn_costs_a_resting_player_one_cycle(to_x, cycles):
     # to (-2.35, 0.87): behind, 2.506 m away: a cycle of turning, two to run 1.42 of 1.44 m
     to_y = 0.87 if to_x == -2.35 else 0.0
-    assert prediction.cycles_to_point(C, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, to_x, to_y) == cycles
+    assert prediction.cycles_to_point(C, AT_REST, to_x, to_y) == cycles
 
 
 @pytest.mark.parametrize(("to", "cycles"), [((2.93, 0.0), 2), ((0.0, -2.93), 2), ((-2.96, 0.0), 3)])
 def test_a_player_of_unknown_heading_is_believed_to_run_to_the_point(to, cycles):
     # from 0.3 m a cycle: 0.9 and 0.96 m, so 1.86 m and the reach of 1.085 m in two cycles
-    assert prediction.cycles_to_point(C, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, *to) == cycles
+    body = Body(0.0, 0.0, 0.3, 0.0, 0.0, 0.0)
+    assert prediction.cycles_to_point(C, body, *to) == cycles
 
 
 @pytest.mark.parametrize(("cycles", "left"), [(0, 10.0), (1, 9.4), (2, 8.56), (3, 7.624)])
 def test_way_left_after_running_straight(cycles, left):
-    done = prediction.reach_after(C, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 10.0, 0.0, cycles)
-    assert done == approx(left)
+    assert prediction.reach_after(C, AT_REST, 10.0, 0.0, cycles) == approx(left)
 
 
 def to_ball(x, y, ball, ball_v):
-    args = C, float(x), float(y), 0.0, 0.0, 1.0, 0.0, np.array(ball, float), np.array(ball_v, float)
-    return prediction.cycles_to_ball(*args, LIMIT)
+    body = Body(float(x), float(y), 0.0, 0.0, 1.0, 0.0)
+    rolling = Ball(*(float(value) for value in (*ball, *ball_v)))
+    return prediction.cycles_to_ball(C, body, rolling, LIMIT)
 
 
 def test_a_ball_that_comes_is_reached_sooner():
@@ -130,49 +131,49 @@ def test_a_ball_in_reach_takes_no_time():
 
 
 def random_scenes(count):
-    """Position, velocity, heading of a player; position and velocity of a ball."""
+    """A player and a ball."""
     random = np.random.default_rng(11)
     for _ in range(count):
         x, y, bx, by = random.uniform(-15, 15, 4)
         speed, way, yaw, fast, rolls = random.random(5) * (0.48, 6.28, 6.28, 2.5, 6.28)
-        player = x, y, speed * math.cos(way), speed * math.sin(way), math.cos(yaw), math.sin(yaw)
-        yield player, np.array([bx, by]), fast * np.array([math.cos(rolls), math.sin(rolls)])
+        velocity = speed * math.cos(way), speed * math.sin(way)
+        body = Body(x, y, *velocity, math.cos(yaw), math.sin(yaw))
+        yield body, Ball(bx, by, fast * math.cos(rolls), fast * math.sin(rolls))
 
 
 def test_skipping_cycles_finds_the_first_in_which_the_ball_is_reached():
-    for player, ball, ball_v in random_scenes(2000):
+    for body, ball in random_scenes(2000):
         expected = NEVER
         for i in range(2 * C.intercept_horizon):
-            to = ball + C.ball_roll[i] * ball_v
-            needed = prediction.cycles_to_point(C, *player, *to)
+            to = prediction.ball_ahead(C, ball, i)
+            needed = prediction.cycles_to_point(C, body, *to)
             if needed <= i:
                 expected = needed
                 break
-        assert prediction.cycles_to_ball(C, *player, ball, ball_v, LIMIT) == expected
+        assert prediction.cycles_to_ball(C, body, ball, LIMIT) == expected
         if expected < NEVER:
-            assert prediction.cycles_to_ball(C, *player, ball, ball_v, expected - 1) == NEVER
+            assert prediction.cycles_to_ball(C, body, ball, expected - 1) == NEVER
 
 
 def test_skipping_cycles_finds_the_first_meeting_point():
-    for player, ball, ball_v in random_scenes(2000):
+    for body, ball in random_scenes(2000):
         expected = prediction.BEYOND
         for i in range(C.intercept_horizon + 1):
-            to = ball + C.ball_roll[i] * ball_v
-            if prediction.reach_after(C, *player, *to, i) < C.kickable_distance:
+            to = prediction.ball_ahead(C, ball, i)
+            if prediction.reach_after(C, body, *to, i) < C.kickable_distance:
                 expected = i
                 break
-        found, x, y = prediction.meeting_cycles(C, *player, ball, ball_v, 0.0, 0.0, False)
-        assert found == expected
-        assert (x, y) == approx(tuple(ball + C.ball_roll[found] * ball_v))
+        found = prediction.meeting_cycles(C, body, ball, 0.0, 0.0, False)
+        assert found.cycles == expected
+        assert found[1:] == approx(prediction.ball_ahead(C, ball, found.cycles))
 
 
 def test_a_player_sticks_to_the_meeting_point_it_chose():
-    player = 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
-    ball, ball_v = np.array([8.0, 3.0]), np.array([-1.5, 0.0])
-    first, x, y = prediction.meeting_cycles(C, *player, ball, ball_v, 0.0, 0.0, False)
-    later = ball + C.ball_roll[first + 1] * ball_v  # another point that can be reached as well
-    kept, kept_x, kept_y = prediction.meeting_cycles(C, *player, ball, ball_v, *later, True)
-    assert kept >= first
-    assert math.dist((kept_x, kept_y), later) <= math.dist((x, y), later) + 1e-9
-    far, far_x, far_y = prediction.meeting_cycles(C, *player, ball, ball_v, -20.0, 20.0, True)
-    assert (far, far_x, far_y) == (first, x, y)  # an old point farther off than 1 m is given up
+    ball = Ball(8.0, 3.0, -1.5, 0.0)
+    first = prediction.meeting_cycles(C, AT_REST, ball, 0.0, 0.0, False)
+    later = prediction.ball_ahead(C, ball, first.cycles + 1)  # that can be reached as well
+    kept = prediction.meeting_cycles(C, AT_REST, ball, *later, True)
+    assert kept.cycles >= first.cycles
+    assert math.dist(kept[1:], later) <= math.dist(first[1:], later) + 1e-9
+    far = prediction.meeting_cycles(C, AT_REST, ball, -20.0, 20.0, True)
+    assert far == first  # an old point farther off than 1 m is given up

@@ -150,9 +150,9 @@ def test_keepers_are_ranked_by_distance_from_the_passer():
         . . . 3 . o .
         """
     )
-    ranks = [int(tactics.rank_of(scene.c, scene.s, 0, 0, keeper)) for keeper in (1, 2, 3)]
+    ranks = [int(tactics.rank_of(scene.w, 0, 0, keeper)) for keeper in (1, 2, 3)]
     assert ranks == [0, 1, 2]
-    assert [int(tactics.keeper_of_rank(scene.c, scene.s, 0, 0, r)) for r in range(3)] == [1, 2, 3]
+    assert [int(tactics.keeper_of_rank(scene.w, 0, 0, r)) for r in range(3)] == [1, 2, 3]
 
 
 # --- get open ---
@@ -179,7 +179,7 @@ def test_a_keeper_gets_open_where_it_is_least_crowded():
 
 def test_a_lane_with_a_taker_in_it_is_no_good():
     scene = open_scene()
-    scene.s.age[0, 0, scene.index("a")] = 0
+    scene.belief.age[0, 0, scene.index("a")] = 0
     scene.put("a", 4.0, 4.5)  # beside the diagonal: (8.75, -8.75) is 14.1 m, its mirror 13.4 m off
     assert scene.command("1", OPEN) == approx((TURN, 0.0, -45.0))
 
@@ -208,10 +208,10 @@ def test_the_pass_is_expected_from_where_the_ball_is_met():
     scene.face("2", 0.0)
     scene.move("o", -0.5, 0.0)
     scene.predict_meetings("1")
-    soonest = int(scene.s.cycles_to_ball[0, 0].min())
+    soonest = int(scene.belief.cycles_to_ball[0, 0].min())
     assert soonest > 1
     rolled = 0.5 * (1 - 0.94**soonest) / 0.06
-    assert tactics.pass_origin(scene.c, scene.s, 0, 0) == approx((7.0 - rolled, 0.0))
+    assert tactics.pass_origin(scene.w, 0, 0) == approx((7.0 - rolled, 0.0))
 
 
 def test_a_player_too_fast_to_turn_stops_first():
@@ -243,7 +243,7 @@ def test_a_player_runs_to_where_the_ball_will_be():
     )
     scene.move("o", 0.0, -1.0)
     kind, _, angle = scene.command("1", GO)
-    x, y = scene.m.intercept_point[0, 0]
+    x, y = scene.memory.intercept_point[0, 0]
     assert x == approx(8.0)
     assert y < -2.0
     if kind == TURN:
@@ -313,7 +313,7 @@ def test_a_keeper_does_not_leave_it():
 def marking(x, y):
     """Taker a at (x, y), ball at (0, 0), keeper 2 at (10, 0): the place to stand is (7, 0)."""
     scene = Scene("o . . . . . . . . . 2")
-    scene.s.age[0, :, scene.index("a")] = 0
+    scene.belief.age[0, :, scene.index("a")] = 0
     scene.put("a", x, y)
     return scene
 
@@ -339,15 +339,15 @@ def test_a_marker_in_place_stands_sideways():
 def test_a_player_who_lost_the_ball_turns_on_and_on():
     scene = Scene("1 . . . o")
     scene.put("o", 5.0, -3.0)
-    scene.s.cycle[0] = 40
+    scene.belief.cycle[0] = 40
     scene.lose("o", 10)
     assert scene.command("1", GO) == approx((TURN, 0.0, math.degrees(math.atan2(-3, 5))))
     scene.lose("o", 11)
     for cycle in (40, 41, 44):  # first toward where it was, then the same way round
-        scene.s.cycle[0] = cycle
+        scene.belief.cycle[0] = cycle
         assert scene.command("1", OPEN) == approx((TURN, 0.0, -60.0))
         scene.put("o", 5.0, 3.0)
-    scene.s.cycle[0] = 48  # a new search
+    scene.belief.cycle[0] = 48  # a new search
     assert scene.command("1", HOLD) == approx((TURN, 0.0, 60.0))
 
 
@@ -356,7 +356,7 @@ def test_a_player_who_lost_the_ball_turns_on_and_on():
 
 def test_commands_are_cut_to_whole_numbers():
     scene = Scene("1 2 o")
-    scene.c = scene.c._replace(whole_commands=True)
+    scene.change(whole_commands=True)
     scene.put("1", 0.0, 0.0)
     scene.put("2", CORNER, CORNER)
     scene.put("o", CORNER, CORNER + 0.4)
@@ -376,11 +376,11 @@ def test_keepers_play_to_the_right_and_takers_to_the_left(name, direction):
 def test_a_neck_is_turned_only_where_the_view_is_limited():
     scene = open_scene()
     scene.command("1", OPEN)
-    assert scene.s.neck[0, 0] == 0.0
-    scene.c = scene.c._replace(visible_angle=math.pi / 2)
+    assert scene.belief.neck[0, 0] == 0.0
+    scene.change(visible_angle=math.pi / 2)
     scene.put("1", 4.0, 4.0)
     kind, _, _ = scene.command("1", OPEN)
     assert kind == TURN  # by 45 degrees, away from the centre: the neck goes as far as it can
-    assert abs(math.degrees(scene.s.neck[0, 0])) == approx(90.0)
+    assert abs(math.degrees(scene.belief.neck[0, 0])) == approx(90.0)
     scene.command("1", GO)  # looks at the ball, also at (-, -)
-    assert np.isfinite(scene.s.neck[0, 0])
+    assert np.isfinite(scene.belief.neck[0, 0])

@@ -9,7 +9,7 @@ from keepaway_sim.world.geometry import clip, length, wrap
 from keepaway_sim.world.memory import same_team
 from keepaway_sim.world.physics import kick_acceleration, kick_rate, limited
 from keepaway_sim.world.skills.running import direction_of_play, turn_body_along
-from keepaway_sim.world.state import KICK, NONE
+from keepaway_sim.world.state import KICK, NONE, Command
 
 QUARTER = 0.25 * math.pi
 HOLD_RANGE = 5.0  # [m] a nearer opponent is shielded from
@@ -22,132 +22,141 @@ PRESSED_RANGE = 2.0  # [m]
 
 
 @compiled
-def closest_opponent_to(c, s, f, p, x, y):
+def closest_opponent_to(w, f, p, x, y):
     """(player, distance) of the known opponent nearest to a point; (-1, inf) without one."""
+    c, belief = w.constants, w.belief
     nearest, best = -1, math.inf
-    for j in range(c.num_keepers + c.num_takers):
-        if same_team(c, p, j) or s.age[f, p, j] > c.player_lost_age:
+    for j in range(w.num_players):
+        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
             continue
-        away = length(s.position[f, p, j, 0] - x, s.position[f, p, j, 1] - y)
+        away = length(belief.position[f, p, j, 0] - x, belief.position[f, p, j, 1] - y)
         if away < best:
             nearest, best = j, away
     return nearest, best
 
 
 @compiled
-def ball_after(c, s, f, p, kind, power, angle):
+def ball_after(w, f, p, command):
     """Believed place of the ball after this cycle's own command."""
-    ball = c.num_keepers + c.num_takers
-    x, y = s.position[f, p, ball]
-    vx, vy = s.velocity[f, p, ball]
-    if kind == KICK:
-        px, py = s.position[f, p, p]
-        ax, ay = kick_acceleration(c, power, angle, x - px, y - py, s.body[f, p, p])
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    x, y = belief.position[f, p, ball]
+    vx, vy = belief.velocity[f, p, ball]
+    if command.kind == KICK:
+        _, power, angle = command
+        px, py = belief.position[f, p, p]
+        ax, ay = kick_acceleration(c, power, angle, x - px, y - py, belief.body[f, p, p])
         vx, vy = limited(vx + ax, vy + ay, c.ball_speed_max)
     return x + vx, y + vy
 
 
 @compiled
-def hold_ball(c, s, f, p, distance):
+def hold_ball(w, f, p, distance):
     """Keep the ball on the side away from the nearest opponent (P: holdBall).
 
     Args:
         distance: share of the kickable margin between body and ball.
     """
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    bx, by = s.position[f, p, ball]
-    yaw = s.body[f, p, p]
-    opponent, away = closest_opponent_to(c, s, f, p, bx, by)
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    yaw = belief.body[f, p, p]
+    opponent, away = closest_opponent_to(w, f, p, bx, by)
     angle = 0.0
     if opponent >= 0 and away < HOLD_RANGE:
-        ox, oy = s.position[f, p, opponent]
+        ox, oy = belief.position[f, p, opponent]
         from_opponent = math.atan2(py - oy, px - ox)
-        heads_left = wrap(s.body[f, p, opponent] - from_opponent) > 0.0
+        heads_left = wrap(belief.body[f, p, opponent] - from_opponent) > 0.0
         angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - yaw)
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
     spot = length(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))
     if spot < AT_SPOT:
-        chosen = turn_body_along(c, s, f, p, direction_of_play(c, p))
-        next_x, next_y = ball_after(c, s, f, p, NONE, 0.0, 0.0)
-        vx, vy = s.velocity[f, p, p]
+        chosen = turn_body_along(w, f, p, direction_of_play(c, p))
+        next_x, next_y = ball_after(w, f, p, Command(NONE, 0.0, 0.0))
+        vx, vy = belief.velocity[f, p, p]
         stays = length(next_x - px - vx, next_y - py - vy)
         if stays < STAYS_SHARE * c.kickable_distance:
             return chosen
-    return kick_close(c, s, f, p, angle, distance)
+    return kick_close(w, f, p, angle, distance)
 
 
 @compiled
-def _rate(c, s, f, p):
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    bx, by = s.position[f, p, ball]
-    return kick_rate(c, bx - px, by - py, s.body[f, p, p])
+def _rate(w, f, p):
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    return kick_rate(c, bx - px, by - py, belief.body[f, p, p])
 
 
 @compiled
-def kick_close(c, s, f, p, angle, distance):
+def kick_close(w, f, p, angle, distance):
     """Kick the ball to a spot beside the body (P: kickBallCloseToBody).
 
     Args:
         angle: of the spot, relative to the body [rad].
         distance: share of the kickable margin between body and ball.
     """
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    ux, uy = s.velocity[f, p, p]
-    bx, by = s.position[f, p, ball]
-    vx, vy = s.velocity[f, p, ball]
-    yaw = s.body[f, p, p]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    ux, uy = belief.velocity[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    vx, vy = belief.velocity[f, p, ball]
+    yaw = belief.body[f, p, p]
     reach = c.touch_distance + c.kickable_margin * distance
     want_x = px + ux + reach * math.cos(yaw + angle) - bx - vx
     want_y = py + uy + reach * math.sin(yaw + angle) - by - vy
-    power = length(want_x, want_y) / _rate(c, s, f, p)
+    power = length(want_x, want_y) / _rate(w, f, p)
     if power > 100.0 and length(vx, vy) > 0.1:
-        return freeze_ball(c, s, f, p)
-    return KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - yaw)
+        return freeze_ball(w, f, p)
+    return Command(KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - yaw))
 
 
 @compiled
-def freeze_ball(c, s, f, p):
+def freeze_ball(w, f, p):
     """Stop the ball where it is, or bring it back within reach (P: freezeBall)."""
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    ux, uy = s.velocity[f, p, p]
-    bx, by = s.position[f, p, ball]
-    vx, vy = s.velocity[f, p, ball]
-    power = min(length(vx, vy) / _rate(c, s, f, p), 100.0)
-    angle = wrap(math.atan2(vy, vx) + math.pi - s.body[f, p, p])
-    next_x, next_y = ball_after(c, s, f, p, KICK, power, angle)
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    ux, uy = belief.velocity[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    vx, vy = belief.velocity[f, p, ball]
+    power = min(length(vx, vy) / _rate(w, f, p), 100.0)
+    angle = wrap(math.atan2(vy, vx) + math.pi - belief.body[f, p, p])
+    kick = Command(KICK, power, angle)
+    next_x, next_y = ball_after(w, f, p, kick)
     if length(next_x - px - ux, next_y - py - uy) < FREEZE_SHARE * c.kickable_distance:
-        return KICK, power, angle
+        return kick
     rel_x, rel_y = bx - px - ux, by - py - uy
     rest = length(rel_x, rel_y)
     reach = min(SAFE_REACH * c.kickable_distance, rest - 0.1)
     direction = math.atan2(rel_y, rel_x)
     to_x = px + ux + reach * math.cos(direction)
     to_y = py + uy + reach * math.sin(direction)
-    return accelerate_ball(c, s, f, p, to_x - bx, to_y - by)
+    return accelerate_ball(w, f, p, to_x - bx, to_y - by)
 
 
 SAFE_REACH = 0.7  # [1] of the kickable distance, where a frozen ball is brought back to
 
 
 @compiled
-def accelerate_ball(c, s, f, p, want_x, want_y):
+def accelerate_ball(w, f, p, want_x, want_y):
     """Give the ball a velocity, or at least its direction (P: accelerateBallToVelocity)."""
-    ball = c.num_keepers + c.num_takers
-    vx, vy = s.velocity[f, p, ball]
-    yaw = s.body[f, p, p]
-    rate = _rate(c, s, f, p)
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    vx, vy = belief.velocity[f, p, ball]
+    yaw = belief.body[f, p, p]
+    rate = _rate(w, f, p)
     ax, ay = want_x - vx, want_y - vy
     size = length(ax, ay)
     if size < c.ball_accel_max and size / rate <= 100.0:
-        return KICK, size / rate, wrap(math.atan2(ay, ax) - yaw)
+        return Command(KICK, size / rate, wrap(math.atan2(ay, ax) - yaw))
     direction = math.atan2(want_y, want_x)
     across = -math.sin(direction) * vx + math.cos(direction) * vy
     angle = direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
-    return KICK, 100.0, wrap(angle - yaw)
+    return Command(KICK, 100.0, wrap(angle - yaw))
 
 
 @compiled
@@ -159,42 +168,44 @@ def pass_speed(c, distance, end_speed):
 
 
 @compiled
-def kick_to(c, s, f, p, x, y, end_speed):
+def kick_to(w, f, p, x, y, end_speed):
     """Kick the ball so that it passes a point with `end_speed`, set it up first if it must be.
 
     P: kickTo.
     """
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    ux, uy = s.velocity[f, p, p]
-    bx, by = s.position[f, p, ball]
-    vx, vy = s.velocity[f, p, ball]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    ux, uy = belief.velocity[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    vx, vy = belief.velocity[f, p, ball]
     direction = math.atan2(y - by, x - bx)
     speed = pass_speed(c, length(x - bx, y - by), end_speed)
     cosine, sine = math.cos(direction), math.sin(direction)
     if length(px + ux - bx - speed * cosine, py + uy - by - speed * sine) < c.touch_distance:
         along = abs(cosine * (px - bx) + sine * (py - by))  # the kick would hit the own body
         speed = along - c.touch_distance if speed < along else along + c.touch_distance
-    rate = _rate(c, s, f, p)
+    rate = _rate(w, f, p)
     if speed > c.ball_speed_max:
-        return _kick_unreachable(c, s, f, p, direction, speed, rate)
+        return _kick_unreachable(w, f, p, direction, speed, rate)
     power = length(speed * cosine - vx, speed * sine - vy) / rate
-    pressed = closest_opponent_to(c, s, f, p, bx, by)[1] < PRESSED_RANGE
+    pressed = closest_opponent_to(w, f, p, bx, by)[1] < PRESSED_RANGE
     if power <= 100.0 * (OVER_POWER_PRESSED if pressed else OVER_POWER):
-        return accelerate_ball(c, s, f, p, speed * cosine, speed * sine)
-    return kick_close(c, s, f, p, 0.0, c.setup_distance)
+        return accelerate_ball(w, f, p, speed * cosine, speed * sine)
+    return kick_close(w, f, p, 0.0, c.setup_distance)
 
 
 @compiled
-def _kick_unreachable(c, s, f, p, direction, speed, rate):
+def _kick_unreachable(w, f, p, direction, speed, rate):
     """A kick harder than the ball can fly: kick if nearly full speed, else set it up."""
-    ball = c.num_keepers + c.num_takers
-    vx, vy = s.velocity[f, p, ball]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    vx, vy = belief.velocity[f, p, ball]
     across = -math.sin(direction) * vx + math.cos(direction) * vy
     angle = direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
     reached = length(vx + 100.0 * rate * math.cos(angle), vy + 100.0 * rate * math.sin(angle))
     if reached > c.when_to_kick * c.ball_accel_max:
-        return accelerate_ball(c, s, f, p, speed * math.cos(direction), speed * math.sin(direction))
+        return accelerate_ball(w, f, p, speed * math.cos(direction), speed * math.sin(direction))
     if rate > c.when_to_kick * c.kick_power_rate:
-        return freeze_ball(c, s, f, p)
-    return kick_close(c, s, f, p, 0.0, c.setup_distance)
+        return freeze_ball(w, f, p)
+    return kick_close(w, f, p, 0.0, c.setup_distance)

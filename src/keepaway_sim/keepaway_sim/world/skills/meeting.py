@@ -9,75 +9,64 @@ from keepaway_sim.world.geometry import clip, length, wrap
 from keepaway_sim.world.skills.kicking import FREEZE_SHARE, closest_opponent_to
 from keepaway_sim.world.skills.prediction import (
     LOOK_AHEAD,
+    ball_of,
+    body_of,
     dash_power,
     heading_to_go,
     meeting_cycles,
     turn_moment,
 )
 from keepaway_sim.world.skills.running import dash_to, direction_of_play, turn_body_along
-from keepaway_sim.world.state import DASH, NONE, TURN
+from keepaway_sim.world.state import DASH, NONE, TURN, Command
 
 CLOSE_RANGE = 3.0  # [m] an opponent so near makes a player take the ball at once
 FACING = math.radians(25.0)  # [rad] faces its direction of play well enough
 
 
 @compiled
-def intercept(c, s, m, f, p):
+def intercept(w, f, p):
     """Go where the ball can be met first (P: intercept, predictCommandToInterceptBall)."""
-    ball = c.num_keepers + c.num_takers
-    x, y = s.position[f, p, p]
-    vx, vy = s.velocity[f, p, p]
-    ux, uy = math.cos(s.body[f, p, p]), math.sin(s.body[f, p, p])
-    now = s.cycle[f]
-    has_old = m.intercept_cycle[f, p] >= now - 2
-    cycles, to_x, to_y = meeting_cycles(
-        c,
-        x,
-        y,
-        vx,
-        vy,
-        ux,
-        uy,
-        s.position[f, p, ball],
-        s.velocity[f, p, ball],
-        m.intercept_point[f, p, 0],
-        m.intercept_point[f, p, 1],
-        has_old,
-    )
-    m.intercept_cycle[f, p] = now
-    m.intercept_point[f, p, 0], m.intercept_point[f, p, 1] = to_x, to_y
+    c, belief, memory = w.constants, w.belief, w.memory
+    body, now = body_of(w, f, p, p), belief.cycle[f]
+    has_old = memory.intercept_cycle[f, p] >= now - 2
+    old_x, old_y = memory.intercept_point[f, p]
+    cycles, to_x, to_y = meeting_cycles(c, body, ball_of(w, f, p), old_x, old_y, has_old)
+    memory.intercept_cycle[f, p] = now
+    memory.intercept_point[f, p, 0], memory.intercept_point[f, p, 1] = to_x, to_y
     if cycles < 3:
-        close = meet_closely(c, s, f, p)
-        if close[0] != NONE:
+        close = meet_closely(w, f, p)
+        if close.kind != NONE:
             return close
     roll = c.player_roll[min(cycles, LOOK_AHEAD)]
+    x, y, vx, vy, ux, uy = body
     if length(to_x - x - roll * vx, to_y - y - roll * vy) < 0.5:
-        return turn_body_along(c, s, f, p, direction_of_play(c, p))
-    turns, wx, wy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance)
+        return turn_body_along(w, f, p, direction_of_play(c, p))
+    turns, wx, wy = heading_to_go(c, body, to_x, to_y, cycles)
     if turns:
         angle = math.atan2(ux * wy - uy * wx, ux * wx + uy * wy)
-        return TURN, 0.0, turn_moment(c, angle, length(vx, vy))
-    return dash_to(c, s, f, p, to_x, to_y, max(cycles, 1))
+        return Command(TURN, 0.0, turn_moment(c, angle, length(vx, vy)))
+    return dash_to(w, f, p, to_x, to_y, max(cycles, 1))
 
 
 @compiled
-def meet_closely(c, s, f, p):
+def meet_closely(w, f, p):
     """Command for a ball that can be met within two cycles; NONE if nothing helps.
 
     With an opponent near, a dash brings the ball into reach at once; otherwise the player first
     turns toward its direction of play while the ball comes (P: interceptClose).
     """
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    vx, vy = s.velocity[f, p, p]
-    bx, by = s.position[f, p, ball]
-    ux, uy = s.velocity[f, p, ball]
-    power, dash_helps = _one_dash(c, s, f, p)
-    if dash_helps and closest_opponent_to(c, s, f, p, px, py)[1] < CLOSE_RANGE:
-        return DASH, power, 0.0
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    vx, vy = belief.velocity[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    ux, uy = belief.velocity[f, p, ball]
+    power, dash_helps = _one_dash(w, f, p)
+    if dash_helps and closest_opponent_to(w, f, p, px, py)[1] < CLOSE_RANGE:
+        return Command(DASH, power, 0.0)
     forward = direction_of_play(c, p)
-    yaw = s.body[f, p, p]
-    turn = turn_body_along(c, s, f, p, forward)
+    yaw = belief.body[f, p, p]
+    turn = turn_body_along(w, f, p, forward)
     within = FREEZE_SHARE * c.kickable_distance
     turn_helps = False
     reached = yaw
@@ -93,33 +82,34 @@ def meet_closely(c, s, f, p):
             if abs(wrap(forward - reached)) < FACING:
                 return turn
     if abs(wrap(forward - yaw)) > FACING:
-        kind, stop, _ = dash_to(c, s, f, p, px, py, 1)
+        kind, stop, _ = dash_to(w, f, p, px, py, 1)
         sx = px + vx + c.dash_power_rate * stop * math.cos(yaw)
         sy = py + vy + c.dash_power_rate * stop * math.sin(yaw)
         ball_roll = c.ball_roll[2]
         if length(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
-            return kind, stop, 0.0
+            return Command(kind, stop, 0.0)
     if turn_helps:
         return turn
     if dash_helps:
-        return DASH, power, 0.0
-    return NONE, 0.0, 0.0
+        return Command(DASH, power, 0.0)
+    return Command(NONE, 0.0, 0.0)
 
 
 @compiled
-def _one_dash(c, s, f, p):
+def _one_dash(w, f, p):
     """(power, helps): the dash after which the ball lies in front of the body and in reach.
 
     The player's line of movement is cut with a circle around the next place of the ball; of the
     two points the one further in its direction of play is taken, then the other.
     """
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    vx, vy = s.velocity[f, p, p]
-    yaw = s.body[f, p, p]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    vx, vy = belief.velocity[f, p, p]
+    yaw = belief.body[f, p, p]
     cosine, sine = math.cos(yaw), math.sin(yaw)
-    bx = s.position[f, p, ball, 0] + s.velocity[f, p, ball, 0]
-    by = s.position[f, p, ball, 1] + s.velocity[f, p, ball, 1]
+    bx = belief.position[f, p, ball, 0] + belief.velocity[f, p, ball, 0]
+    by = belief.position[f, p, ball, 1] + belief.velocity[f, p, ball, 1]
     speed = cosine * vx + sine * vy
     rel_x, rel_y = bx - px - vx, by - py - vy
     along, across = cosine * rel_x + sine * rel_y, cosine * rel_y - sine * rel_x

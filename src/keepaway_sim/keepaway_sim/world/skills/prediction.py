@@ -7,6 +7,7 @@ one already chosen can still be met safely (P also moves on to a safer point nex
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER, ROLL_CYCLES
@@ -21,6 +22,58 @@ KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one 
 LATELY = 3  # [cycles] P: motion seen longer ago is unknown
 UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
+
+
+class Body(NamedTuple):
+    """A player as another one believes it."""
+
+    x: float  # [m]
+    y: float
+    vx: float  # [m/cycle]
+    vy: float
+    ux: float  # unit vector of the body direction; both 0: unknown
+    uy: float
+
+
+class Ball(NamedTuple):
+    """The ball as a player believes it."""
+
+    x: float  # [m]
+    y: float
+    vx: float  # [m/cycle]
+    vy: float
+
+
+class Meeting(NamedTuple):
+    """When and where a player meets the ball."""
+
+    cycles: int  # from now; NEVER if it does not
+    x: float  # [m]
+    y: float
+
+
+@compiled
+def body_of(w, f, p, j):
+    """Player j as player p believes it."""
+    x, y = w.belief.position[f, p, j]
+    vx, vy = w.belief.velocity[f, p, j]
+    yaw = w.belief.body[f, p, j]
+    return Body(x, y, vx, vy, math.cos(yaw), math.sin(yaw))
+
+
+@compiled
+def ball_of(w, f, p):
+    """The ball as player p believes it."""
+    x, y = w.belief.position[f, p, w.ball]
+    vx, vy = w.belief.velocity[f, p, w.ball]
+    return Ball(x, y, vx, vy)
+
+
+@compiled
+def ball_ahead(c, ball, cycles):
+    """Where the ball will have rolled after `cycles`, at most ROLL_CYCLES - 1."""
+    roll = c.ball_roll[cycles]
+    return ball.x + roll * ball.vx, ball.y + roll * ball.vy
 
 
 @compiled
@@ -39,20 +92,22 @@ def turn_moment(c, angle, speed):
 
 
 @compiled
-def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
+def heading_to_go(c, body, to_x, to_y, cycles):
     """Does a player turn before it runs to a point, and where does it face a cycle later?
 
     A player turns while the point lies off the line of its body, or behind it and further than
-    `back_distance`; near points may also be reached backwards (P: predictCommandTurnTowards).
+    `back_dash_distance`; near points may also be reached backwards (P: predictCommandTurnTowards).
 
     Args:
-        x, y, vx, vy: the player's position [m] and velocity [m/cycle].
-        ux, uy: unit vector of its body direction.
+        c: Constants.
+        body: Body of the player.
         to_x, to_y, cycles: the point, and the time there is to reach it.
 
     Returns:
         whether it turns, and the unit vector of its body after one cycle of it.
     """
+    x, y, vx, vy, ux, uy = body
+    back_distance = c.back_dash_distance
     roll = c.player_roll[min(cycles, LOOK_AHEAD)]
     rel_x, rel_y = to_x - x - roll * vx, to_y - y - roll * vy
     away = length(to_x - x, to_y - y)
@@ -73,11 +128,12 @@ def heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, back_distance):
 
 
 @compiled
-def _faces(c, rel_x, rel_y, vx, vy, ux, uy):
+def _faces(c, body, rel_x, rel_y):
     """Does a point lie so well ahead that `heading_to_go` does not turn? Cheap, and misses some."""
-    rel_x, rel_y = rel_x - vx, rel_y - vy
-    ahead = ux * rel_x + uy * rel_y
-    return ahead > 0.0 and abs(ux * rel_y - uy * rel_x) <= 0.9 * c.kickable_distance
+    rel_x, rel_y = rel_x - body.vx, rel_y - body.vy
+    ahead = body.ux * rel_x + body.uy * rel_y
+    across = body.ux * rel_y - body.uy * rel_x
+    return ahead > 0.0 and abs(across) <= 0.9 * c.kickable_distance
 
 
 @compiled
@@ -103,27 +159,32 @@ def _turned(ux, uy, to_x, to_y, most):
 
 
 @compiled
-def reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
+def reach_after(c, body, to_x, to_y, cycles):
     """Distance to a point that is left after `cycles` of going there (P: intercept loop).
 
     The player turns as long as it must, then runs on its line. Simplified: the speed limit of a
     player that rolls sideways while it dashes at full power is left out.
     """
-    turning = True
     while cycles > 0:
-        turning, ux, uy = heading_to_go(
-            c, x, y, vx, vy, ux, uy, to_x, to_y, cycles, c.back_dash_distance
-        )
+        turning, ux, uy = heading_to_go(c, body, to_x, to_y, cycles)
+        body = Body(body.x, body.y, body.vx, body.vy, ux, uy)
         if not turning:
             break
-        x, y = x + vx, y + vy
-        vx, vy = c.player_decay * vx, c.player_decay * vy
+        body = _rolled(c, body)
         cycles -= 1
+    x, y, vx, vy, ux, uy = body
     rel_x, rel_y = to_x - x, to_y - y
     along, speed = ux * rel_x + uy * rel_y, ux * vx + uy * vy
     across = ux * rel_y - uy * rel_x - c.player_roll[cycles] * (ux * vy - uy * vx)
     forward, speed = (along, speed) if along >= 0.0 else (-along, -speed)
     return length(max(forward - full_run(c, speed, cycles), 0.0), across)
+
+
+@compiled
+def _rolled(c, body):
+    """A body a cycle later, if its player does nothing."""
+    x, y, vx, vy, ux, uy = body
+    return Body(x + vx, y + vy, c.player_decay * vx, c.player_decay * vy, ux, uy)
 
 
 @compiled
@@ -138,54 +199,56 @@ def full_run(c, speed, cycles):
 
 
 @compiled
-def meeting_cycles(c, x, y, vx, vy, ux, uy, ball, ball_v, old_x, old_y, has_old):
-    """Cycles until a player can meet the ball, and where.
+def meeting_cycles(c, body, ball, old_x, old_y, has_old):
+    """The first Meeting of a player with the ball, or the old one if that can still be kept.
 
     Args:
-        ball, ball_v: (2,) believed position [m] and velocity [m/cycle].
+        c: Constants.
+        body: Body of the player.
+        ball: Ball.
         old_x, old_y, has_old: the meeting point chosen in the last cycles, if any.
 
     Returns:
-        cycles (BEYOND if not within the horizon), x, y of the ball then.
+        Meeting, after BEYOND cycles if there is none within the horizon.
     """
-    first, first_x, first_y = NEVER, 0.0, 0.0
-    kept, kept_x, kept_y, kept_off = NEVER, 0.0, 0.0, SAME_POINT
-    speed = length(ball_v[0], ball_v[1])
-    i = _straight_run(c, x, y, vx, vy, ball, ball_v, c.intercept_horizon)
+    first = Meeting(NEVER, 0.0, 0.0)
+    kept, kept_off = Meeting(NEVER, 0.0, 0.0), SAME_POINT
+    speed = length(ball.vx, ball.vy)
+    i = _straight_run(c, body, ball, c.intercept_horizon)
     while i <= c.intercept_horizon:
-        roll = c.ball_roll[i]
-        bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
+        bx, by = ball_ahead(c, ball, i)
         off = length(bx - old_x, by - old_y) if has_old else math.inf
-        moving = speed * _left_of_speed(c, roll) > MOVING_BALL
+        moving = speed * _left_of_speed(c, c.ball_roll[i]) > MOVING_BALL
         candidate = moving and off < kept_off
         skip = 1
-        if first == NEVER or candidate:
-            left = _left_after(c, x, y, vx, vy, ux, uy, bx, by, i)
-            if first == NEVER and left < c.kickable_distance:
-                first, first_x, first_y = i, bx, by
+        if first.cycles == NEVER or candidate:
+            left = _left_after(c, body, bx, by, i)
+            if first.cycles == NEVER and left < c.kickable_distance:
+                first = Meeting(i, bx, by)
             if candidate and left < SAFE_SHARE * c.kickable_distance:
-                kept, kept_x, kept_y, kept_off = i, bx, by, off
-            if first == NEVER:
+                kept, kept_off = Meeting(i, bx, by), off
+            if first.cycles == NEVER:
                 skip = max(int((left - c.kickable_distance) / (1.0 + speed)), 1)
-        if first != NEVER and (not has_old or not moving or i >= first + KEEP_HORIZON):
+        decided = not has_old or not moving or i >= first.cycles + KEEP_HORIZON
+        if first.cycles != NEVER and decided:
             break
         i += skip
-    if kept != NEVER:
-        return kept, kept_x, kept_y
-    if first != NEVER:
-        return first, first_x, first_y
-    roll = c.ball_roll[BEYOND]
-    return BEYOND, ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
+    if kept.cycles != NEVER:
+        return kept
+    if first.cycles != NEVER:
+        return first
+    bx, by = ball_ahead(c, ball, BEYOND)
+    return Meeting(BEYOND, bx, by)
 
 
 @compiled
-def _left_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles):
+def _left_after(c, body, to_x, to_y, cycles):
     """`reach_after`, but only a lower bound where the point is out of question."""
     roll = c.player_roll[min(cycles, LOOK_AHEAD)]
-    rest = length(to_x - x - roll * vx, to_y - y - roll * vy)
+    rest = length(to_x - body.x - roll * body.vx, to_y - body.y - roll * body.vy)
     if rest / c.player_speed_max > cycles + c.kickable_distance:
         return rest - cycles * c.player_speed_max
-    return reach_after(c, x, y, vx, vy, ux, uy, to_x, to_y, cycles)
+    return reach_after(c, body, to_x, to_y, cycles)
 
 
 @compiled
@@ -207,54 +270,55 @@ def run_cycles(c, distance, speed):
 
 
 @compiled
-def cycles_to_point(c, x, y, vx, vy, ux, uy, to_x, to_y):
+def cycles_to_point(c, body, to_x, to_y):
     """Cycles a player needs to bring a point within kicking distance (turns included).
 
     A player whose heading is unknown (ux = uy = 0) is believed to run there (P).
     """
     cycles = 0
     for _ in range(5):
-        rel_x, rel_y = to_x - x, to_y - y
+        rel_x, rel_y = to_x - body.x, to_y - body.y
         distance = length(rel_x, rel_y)
         if distance < c.kickable_distance:
             return cycles
-        if ux == 0.0 and uy == 0.0:
+        if body.ux == 0.0 and body.uy == 0.0:
             return run_cycles(c, distance, UNKNOWN_SPEED)
-        if _faces(c, rel_x, rel_y, vx, vy, ux, uy):
+        if _faces(c, body, rel_x, rel_y):
             break
-        turns, ux, uy = heading_to_go(c, x, y, vx, vy, ux, uy, to_x, to_y, 1, c.back_dash_distance)
+        turns, ux, uy = heading_to_go(c, body, to_x, to_y, 1)
+        body = Body(body.x, body.y, body.vx, body.vy, ux, uy)
         if not turns:
             break
-        x, y = x + vx, y + vy
-        vx, vy = c.player_decay * vx, c.player_decay * vy
+        body = _rolled(c, body)
         cycles += 1
-    return cycles + run_cycles(c, length(to_x - x, to_y - y), ux * vx + uy * vy)
+    speed = body.ux * body.vx + body.uy * body.vy
+    return cycles + run_cycles(c, length(to_x - body.x, to_y - body.y), speed)
 
 
 @compiled
-def cycles_to_ball(c, x, y, vx, vy, ux, uy, ball, ball_v, limit):
+def cycles_to_ball(c, body, ball, limit):
     """Cycles a player needs to reach the moving ball; NEVER if that takes more than `limit`.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
     (P: getFastestInSetTo). Cycles are skipped in which it cannot be.
     """
-    speed = length(ball_v[0], ball_v[1])
+    speed = length(ball.vx, ball.vy)
     if speed < STILL:
-        needed = cycles_to_point(c, x, y, vx, vy, ux, uy, ball[0], ball[1])
+        needed = cycles_to_point(c, body, ball.x, ball.y)
         return needed if needed <= limit else NEVER
-    i = _straight_run(c, x, y, vx, vy, ball, ball_v, limit)
+    i = _straight_run(c, body, ball, limit)
     while i <= limit:
-        roll = c.ball_roll[i]
-        bx, by = ball[0] + roll * ball_v[0], ball[1] + roll * ball_v[1]
-        needed = cycles_to_point(c, x, y, vx, vy, ux, uy, bx, by)
+        bx, by = ball_ahead(c, ball, i)
+        needed = cycles_to_point(c, body, bx, by)
         if needed <= i:
             return needed
-        i += max(int((needed - i) / (1.0 + speed * _left_of_speed(c, roll))), 1)
+        left = _left_of_speed(c, c.ball_roll[i])
+        i += max(int((needed - i) / (1.0 + speed * left)), 1)
     return NEVER
 
 
 @compiled
-def _straight_run(c, x, y, vx, vy, ball, ball_v, limit):
+def _straight_run(c, body, ball, limit):
     """Cycles before which nobody reaches the ball, even running straight without a turn.
 
     Beyond `limit` it is not looked for.
@@ -262,17 +326,18 @@ def _straight_run(c, x, y, vx, vy, ball, ball_v, limit):
     The distance to a ball on a straight line is a convex function of the way it has rolled, so
     it falls by no more than it falls now; cycles in which it cannot have fallen enough are skipped.
     """
-    lead = c.kickable_distance + length(vx, vy) * c.player_roll[ROLL_CYCLES - 1]
+    lead = c.kickable_distance + length(body.vx, body.vy) * c.player_roll[ROLL_CYCLES - 1]
     i = 0
     while i <= limit:
-        roll = c.ball_roll[i]
-        rel_x, rel_y = ball[0] + roll * ball_v[0] - x, ball[1] + roll * ball_v[1] - y
+        bx, by = ball_ahead(c, ball, i)
+        rel_x, rel_y = bx - body.x, by - body.y
         distance = length(rel_x, rel_y)
         gap = distance - lead - c.top_speed * i
         if gap <= 0.0:
             return i
-        coming = max(-(rel_x * ball_v[0] + rel_y * ball_v[1]) / distance, 0.0)
-        i += max(int(gap / (c.top_speed + coming * _left_of_speed(c, roll))), 1)
+        coming = max(-(rel_x * ball.vx + rel_y * ball.vy) / distance, 0.0)
+        left = _left_of_speed(c, c.ball_roll[i])
+        i += max(int(gap / (c.top_speed + coming * left)), 1)
     return i
 
 

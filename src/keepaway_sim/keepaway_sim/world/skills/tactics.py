@@ -1,8 +1,8 @@
 """A requested high-level action becomes this cycle's dash, turn or kick.
 
-Every skill reads the acting player's own belief only (`vision.Perceptions` and `vision.Memory`),
-never the truth. A command is (kind, power, angle): a dash has a power, a turn an angle (the
-moment to send, radians), a kick both (angle relative to the body).
+Every skill reads the acting player's own belief and memory only, never the truth. Of a `Command`
+a dash uses the power, a turn the angle (the moment to send), a kick both (angle relative to the
+body).
 
 Source: P BasicPlayer.cc and KeepawayPlayer.cc. Simplified: `meet_closely` leaves out colliding
 with the ball on purpose.
@@ -27,7 +27,7 @@ from keepaway_sim.world.skills.running import (
     turn_body_along,
     turn_body_to,
 )
-from keepaway_sim.world.state import DASH
+from keepaway_sim.world.state import DASH, Command
 
 _HOLD = int(Action.HOLD_BALL)
 _PASS = int(Action.PASS_BALL)
@@ -41,7 +41,7 @@ MARK_LEAD = 1.0  # [m] P: a marked player is expected so far toward the marker's
 
 
 @compiled
-def command(c, s, m, f, p, action, target):
+def command(w, f, p, action, target):
     """This cycle's command of player p for a requested action.
 
     Args:
@@ -49,42 +49,44 @@ def command(c, s, m, f, p, action, target):
             holding or passing.
 
     Returns:
-        (kind, power, angle); also turns the neck, by the belief `s`, where vision is limited.
+        Command; also turns the neck where vision is limited.
     """
-    ball = c.num_keepers + c.num_takers
-    if s.age[f, p, ball] > c.ball_lost_age:
-        return _whole(c, search(c, s, m, f, p))
-    if action == _HOLD and s.ball_kickable[f, p]:
-        return _whole(c, hold_ball(c, s, f, p, c.hold_distance))
-    if action == _PASS and s.ball_kickable[f, p]:
-        x, y = s.position[f, p, target]
-        return _whole(c, kick_to(c, s, f, p, x, y, c.pass_end_speed))
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    if belief.age[f, p, ball] > c.ball_lost_age:
+        return _whole(c, search(w, f, p))
+    if action == _HOLD and belief.ball_kickable[f, p]:
+        return _whole(c, hold_ball(w, f, p, c.hold_distance))
+    if action == _PASS and belief.ball_kickable[f, p]:
+        x, y = belief.position[f, p, target]
+        return _whole(c, kick_to(w, f, p, x, y, c.pass_end_speed))
     if action == _OPEN:
-        chosen = _patient(c, s, m, f, p, get_open(c, s, m, f, p))
-        _look_at(c, s, f, p, 0.0, 0.0, chosen)
+        chosen = _patient(w, f, p, get_open(w, f, p))
+        _look_at(w, f, p, 0.0, 0.0, chosen)
     elif action == _MARK:
-        chosen = _patient(c, s, m, f, p, mark_keeper(c, s, f, p, target))
-        _look_at(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], chosen)
+        chosen = _patient(w, f, p, mark_keeper(w, f, p, target))
+        _look_at(w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], chosen)
     else:
-        chosen = _patient(c, s, m, f, p, go_to_ball(c, s, m, f, p))
-        _look_at(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], chosen)
+        chosen = _patient(w, f, p, go_to_ball(w, f, p))
+        _look_at(w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], chosen)
     return _whole(c, chosen)
 
 
 @compiled
-def _patient(c, s, m, f, p, chosen):
+def _patient(w, f, p, chosen):
     """The chosen command, or a turn to the ball after too many backward dashes in vain.
 
     S since 17.0.0 takes a backward dash for none; P does not know, and some of its players would
     dash on for ever behind a ball that is held beside them.
     """
-    ball = c.num_keepers + c.num_takers
-    vx, vy = s.velocity[f, p, p]
-    in_vain = chosen[0] == DASH and chosen[1] < 0.0 and length(vx, vy) < AT_REST
-    m.vain_dashes[f, p] = m.vain_dashes[f, p] + 1 if in_vain else 0
-    if m.vain_dashes[f, p] <= c.patience:
+    c, belief, memory = w.constants, w.belief, w.memory
+    ball = w.ball
+    vx, vy = belief.velocity[f, p, p]
+    in_vain = chosen.kind == DASH and chosen.power < 0.0 and length(vx, vy) < AT_REST
+    memory.vain_dashes[f, p] = memory.vain_dashes[f, p] + 1 if in_vain else 0
+    if memory.vain_dashes[f, p] <= c.patience:
         return chosen
-    return turn_body_to(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], 1)
+    return turn_body_to(w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], 1)
 
 
 @compiled
@@ -94,78 +96,86 @@ def _whole(c, chosen):
     if c.whole_commands:
         power = float(int(power))
         angle = math.radians(float(int(math.degrees(angle))))
-    return kind, power, angle
+    return Command(kind, power, angle)
 
 
 @compiled
-def _look_at(c, s, f, p, x, y, chosen):
+def _look_at(w, f, p, x, y, chosen):
+    c = w.constants
     if c.visible_angle < TWO_PI - 1e-9:
-        turn_neck(c, s, f, p, x, y, expected_turn(c, s, f, p, chosen[0], chosen[2]))
+        turn_neck(w, f, p, x, y, expected_turn(w, f, p, chosen))
 
 
 @compiled
-def rank_of(c, s, f, p, keeper):
+def rank_of(w, f, p, keeper):
     """How many other keepers player p believes closer to itself than `keeper`."""
-    own = s.position[f, p, p]
-    x, y = s.position[f, p, keeper]
+    c, belief = w.constants, w.belief
+    own = belief.position[f, p, p]
+    x, y = belief.position[f, p, keeper]
     away = length(x - own[0], y - own[1])
     rank = 0
     for j in range(c.num_keepers):
         if j in (p, keeper):
             continue
-        other = length(s.position[f, p, j, 0] - own[0], s.position[f, p, j, 1] - own[1])
+        other = length(belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1])
         if other < away or (other == away and j < keeper):
             rank += 1
     return rank
 
 
 @compiled
-def keeper_of_rank(c, s, f, p, rank):
+def keeper_of_rank(w, f, p, rank):
     """The keeper that player p believes to be of this rank by distance, 0 the closest."""
+    c = w.constants
     for j in range(c.num_keepers):
-        if j != p and rank_of(c, s, f, p, j) == rank:
+        if j != p and rank_of(w, f, p, j) == rank:
             return j
     return p
 
 
 @compiled
-def get_open(c, s, m, f, p):
+def get_open(w, f, p):
     """Move to the least crowded point a pass can reach (P: getOpenForPassFromInRectangle)."""
-    from_x, from_y = pass_origin(c, s, f, p)
-    x, y = open_point(c, s, m, f, p, from_x, from_y)
-    own = s.position[f, p, p]
+    c, belief = w.constants, w.belief
+    from_x, from_y = pass_origin(w, f, p)
+    x, y = open_point(w, f, p, from_x, from_y)
+    own = belief.position[f, p, p]
     if length(x - own[0], y - own[1]) < c.open_buffer:
-        ball = c.num_keepers + c.num_takers
-        return turn_body_to(c, s, f, p, s.position[f, p, ball, 0], s.position[f, p, ball, 1], 1)
-    return move_to(c, s, f, p, x, y, c.when_to_turn, 0.0)
+        ball = w.ball
+        return turn_body_to(
+            w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], 1
+        )
+    return move_to(w, f, p, x, y, c.when_to_turn, 0.0)
 
 
 @compiled
-def pass_origin(c, s, f, p):
+def pass_origin(w, f, p):
     """Where the ball is believed to be when the fastest team-mate has it."""
-    ball = c.num_keepers + c.num_takers
+    c, belief = w.constants, w.belief
+    ball = w.ball
     soonest = NEVER
-    for j in range(c.num_keepers + c.num_takers):
-        soonest = min(soonest, s.cycles_to_ball[f, p, j])
+    for j in range(w.num_players):
+        soonest = min(soonest, belief.cycles_to_ball[f, p, j])
     roll = c.ball_roll[soonest] if soonest < NEVER else 0.0
-    x, y = s.position[f, p, ball]
-    vx, vy = s.velocity[f, p, ball]
+    x, y = belief.position[f, p, ball]
+    vx, vy = belief.velocity[f, p, ball]
     return x + roll * vx, y + roll * vy
 
 
 @compiled
-def open_point(c, s, m, f, p, from_x, from_y):
+def open_point(w, f, p, from_x, from_y):
     """The point of a 5 x 5 grid with least congestion and no taker in the lane to it.
 
     Congestion is the sum over all other players of 1 / distance. The centre if every lane is
     blocked.
     """
-    congestion, x, y = m.congestion, m.open_x, m.open_y
+    c, belief, congestion = w.constants, w.belief, w.scratch.congestion
+    x, y = c.open_x, c.open_y
     congestion[:] = 0.0
-    for j in range(c.num_keepers + c.num_takers):
-        if j == p or s.age[f, p, j] > c.player_lost_age:
+    for j in range(w.num_players):
+        if j == p or belief.age[f, p, j] > c.player_lost_age:
             continue
-        px, py = s.position[f, p, j]
+        px, py = belief.position[f, p, j]
         for k in range(len(congestion)):
             dx, dy = px - x[k], py - y[k]
             congestion[k] += 1.0 / math.sqrt(dx * dx + dy * dy + 1e-18)
@@ -176,50 +186,53 @@ def open_point(c, s, m, f, p, from_x, from_y):
                 best = k
         if congestion[best] == math.inf:
             break
-        if not _lane_blocked(c, s, f, p, from_x, from_y, x[best], y[best]):
+        if not _lane_blocked(w, f, p, from_x, from_y, x[best], y[best]):
             return x[best], y[best]
         congestion[best] = math.inf
     return 0.0, 0.0
 
 
 @compiled
-def _lane_blocked(c, s, f, p, from_x, from_y, x, y):
-    for j in range(c.num_keepers + c.num_takers):
-        if same_team(c, p, j) or s.age[f, p, j] > c.player_lost_age:
+def _lane_blocked(w, f, p, from_x, from_y, x, y):
+    c, belief = w.constants, w.belief
+    for j in range(w.num_players):
+        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
             continue
-        ox, oy = s.position[f, p, j]
+        ox, oy = belief.position[f, p, j]
         if cone_contains(ox, oy, from_x, from_y, x, y, c.cone_width):
             return True
     return False
 
 
 @compiled
-def go_to_ball(c, s, m, f, p):
+def go_to_ball(w, f, p):
     """Intercept the ball; a taker that has it holds it, and leaves it to a team-mate that has."""
-    ball = c.num_keepers + c.num_takers
-    bx, by = s.position[f, p, ball]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    bx, by = belief.position[f, p, ball]
     if p >= c.num_keepers:
-        if s.ball_kickable[f, p] and nearest_to_ball(c, s, f, p, c.num_keepers, ball) == p:
-            return hold_ball(c, s, f, p, c.taker_hold_distance)
-        nearest = nearest_to_ball(c, s, f, p, 0, ball)
+        if belief.ball_kickable[f, p] and nearest_to_ball(w, f, p, c.num_keepers, ball) == p:
+            return hold_ball(w, f, p, c.taker_hold_distance)
+        nearest = nearest_to_ball(w, f, p, 0, ball)
         if nearest != p and nearest >= c.num_keepers:
-            ox, oy = s.position[f, p, nearest]
+            ox, oy = belief.position[f, p, nearest]
             if length(ox - bx, oy - by) < c.kickable_distance:
-                vx, vy = s.velocity[f, p, ball]
-                return turn_body_to(c, s, f, p, bx + vx, by + vy, 1)
-    return intercept(c, s, m, f, p)
+                vx, vy = belief.velocity[f, p, ball]
+                return turn_body_to(w, f, p, bx + vx, by + vy, 1)
+    return intercept(w, f, p)
 
 
 @compiled
-def nearest_to_ball(c, s, f, p, first, last):
+def nearest_to_ball(w, f, p, first, last):
     """The known player of first..last-1 believed nearest to the ball; p itself counts always."""
-    ball = c.num_keepers + c.num_takers
+    c, belief = w.constants, w.belief
+    ball = w.ball
     nearest, best = -1, math.inf
     for j in range(first, last):
-        if j != p and s.age[f, p, j] > c.player_lost_age:
+        if j != p and belief.age[f, p, j] > c.player_lost_age:
             continue
-        dx = s.position[f, p, j, 0] - s.position[f, p, ball, 0]
-        dy = s.position[f, p, j, 1] - s.position[f, p, ball, 1]
+        dx = belief.position[f, p, j, 0] - belief.position[f, p, ball, 0]
+        dy = belief.position[f, p, j, 1] - belief.position[f, p, ball, 1]
         away = dx * dx + dy * dy
         if away < best:
             nearest, best = j, away
@@ -227,19 +240,20 @@ def nearest_to_ball(c, s, f, p, first, last):
 
 
 @compiled
-def mark_keeper(c, s, f, p, keeper):
+def mark_keeper(w, f, p, keeper):
     """Stand between a keeper and the ball, sideways when there (P: mark, MARK_BALL)."""
-    ball = c.num_keepers + c.num_takers
-    px, py = s.position[f, p, p]
-    kx, ky = s.position[f, p, keeper]
-    bx, by = s.position[f, p, ball]
+    c, belief = w.constants, w.belief
+    ball = w.ball
+    px, py = belief.position[f, p, p]
+    kx, ky = belief.position[f, p, keeper]
+    bx, by = belief.position[f, p, ball]
     lead_x = kx + MARK_LEAD
     direction = math.atan2(by - ky, bx - lead_x)
     x = lead_x + c.mark_distance * math.cos(direction)
     y = ky + c.mark_distance * math.sin(direction)
     if length(x - px, y - py) >= MARK_NEAR:
-        return move_to(c, s, f, p, x, y, c.mark_turn_angle, c.mark_back_distance)
+        return move_to(w, f, p, x, y, c.mark_turn_angle, c.mark_back_distance)
     to_keeper = math.atan2(ky - py, kx - px)
     to_ball = math.atan2(by - py, bx - px)
     left = wrap(to_ball - to_keeper) >= 0.0
-    return turn_body_along(c, s, f, p, to_keeper + (MARK_SIDEWAYS if left else -MARK_SIDEWAYS))
+    return turn_body_along(w, f, p, to_keeper + (MARK_SIDEWAYS if left else -MARK_SIDEWAYS))
