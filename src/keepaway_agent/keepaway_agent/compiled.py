@@ -33,8 +33,11 @@ from typing import Any, Final
 import llvmlite.binding
 import numba
 import numpy as np
-from numba import njit, typeof
+from numba import config, njit, typeof
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
 
 SOURCES: Final = (
     "actions.py",
@@ -50,18 +53,27 @@ KEPT_FOLDERS: Final = 8
 """Folders of machine code that stay on disk; the least recently used ones go."""
 
 _SETTINGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_DISABLED: Final = bool(vars(config)["DISABLE_JIT"])
 _CHECKED: Final = os.environ.get("KEEPAWAY_CHECKED") == "1"
 _LOG = logging.getLogger(__name__)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function of arrays into its callers."""
-    return _kept(njit(forceinline=True, **_SETTINGS)(function))
+    """Compile a function of arrays into its callers.
+
+    Called from Python, as tests do, it is compiled once more, as an entry point.
+    """
+    if _DISABLED:
+        return function
+    settings = {"nopython": True, "forceinline": True, **_UNWRAPPED, **_SETTINGS}
+    return _Inner(function, targetoptions=settings, pipeline_class=_InnerCompiler)
 
 
 def compiled_apart(function: Callable[..., Any]) -> Any:
-    """Compile a function of its own: an entry point, or a long one called from many places."""
-    return _kept(njit(**_SETTINGS)(function))
+    """Compile a function of its own: an entry point."""
+    settings: dict[str, Any] = {"pipeline_class": _EntryCompiler, "no_cfunc_wrapper": True}
+    return _kept(njit(**settings, **_SETTINGS)(function))
 
 
 class Kernel:
@@ -75,11 +87,14 @@ class Kernel:
 
     def __init__(self, function: Any, *frozen: Any) -> None:
         """Take the first arguments, which no call repeats; nothing is compiled yet."""
-        self._function, self._frozen = function, frozen
-        self._code: Callable[..., Any] | None = function if _CHECKED else None
+        self._function, self._frozen = getattr(function, "entry", function), frozen
+        self._code: Callable[..., Any] | None = self._function if _CHECKED else None
 
     def compile_for(self, *arguments: Any) -> None:
         """Compile for arguments of the types of these, so that the first call does not wait."""
+        if _DISABLED:
+            self._code = self._function
+            return
         types = tuple(typeof(value) for value in (*self._frozen, *arguments))
         code = self._function.compile(types)
         self._code = self._code or code
@@ -89,6 +104,70 @@ class Kernel:
         if self._code is None:
             self.compile_for(*arguments)
         return self._code(*self._frozen, *arguments)  # type: ignore[misc]
+
+
+class _Inner(CPUDispatcher):
+    """A function that is compiled into its callers."""
+
+    @functools.cached_property
+    def entry(self) -> Any:
+        """The same function, compiled of its own."""
+        return compiled_apart(self.py_func)
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.entry(*arguments, **named)
+
+
+class _InnerLibrary(JITCodeLibrary):
+    """Code that is linked into its callers'; it is neither optimized nor loaded by itself."""
+
+    is_inner = True
+
+    @property
+    def codegen(self) -> Any:
+        return _Unloaded()
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        return 0
+
+
+class _Unloaded:
+    """Stands for the loader of code that is not loaded."""
+
+    def set_env(self, _name: str, _environment: Any) -> None:
+        pass
+
+
+class _EntryLibrary(JITCodeLibrary):
+    """Code of an entry point: all that it calls, directly or not, is linked in and optimized."""
+
+    def finalize(self) -> None:
+        found = dict.fromkeys(self._linking_libraries)
+        waiting = list(found)
+        while waiting:
+            library = waiting.pop()
+            callees = library._linking_libraries if hasattr(library, "is_inner") else ()
+            waiting += [callee for callee in callees if callee not in found]
+            found |= dict.fromkeys(callees)
+        self._linking_libraries = list(found)
+        super().finalize()
+
+
+class _InnerCompiler(Compiler):
+    library_class: Any = _InnerLibrary
+
+    def _compile_bytecode(self) -> Any:
+        state = self.state
+        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super()._compile_bytecode()
+
+
+class _EntryCompiler(_InnerCompiler):
+    library_class = _EntryLibrary
 
 
 def _kept(dispatcher: Any) -> Any:

@@ -1,6 +1,7 @@
 """SMDP Sarsa(lambda): by hand, and what batches must not change."""
 
 import itertools
+import pickle
 from copy import deepcopy
 
 import numpy as np
@@ -242,3 +243,28 @@ def test_settings_out_of_range_are_refused_by_name(setting, value):
 def test_learners_that_do_not_share_out_are_refused():
     with pytest.raises(AgentError, match="5 learners"):
         make_learners(5, 2, X, learners_per_table=2)
+
+
+def test_a_learner_goes_on_from_a_snapshot_as_it_went_on_then():
+    team = make_learners(2, 2, X, SarsaConfig(alpha=0.5, lambda_=0.5, epsilon=0.0))
+
+    def go_on(i: int) -> list[float]:
+        for x, r_t in ((1.5, 2.0), (3.0, -1.0), (1.0, 0.5)):
+            team.state[i, 0] = x
+            sarsa.step(team, i, r_t, 1.0, GREEDY_FIRST)
+        sarsa.end(team, i, 1.0)
+        return tiles_of(team, i).ravel().tolist()
+
+    team.state[0, 0] = 1.0
+    sarsa.start(team, 0, GREEDY_LAST)
+    kept = pickle.loads(pickle.dumps(sarsa.snapshot(team, 0)))
+    expected = go_on(0)
+    for i in (0, 1):
+        sarsa.restore(team, i, kept)
+        assert go_on(i) == expected
+
+
+def test_a_snapshot_of_another_shape_is_refused():
+    kept = sarsa.snapshot(learner(), 0)
+    with pytest.raises(AgentError, match="a snapshot of weights"):
+        sarsa.restore(make_learners(1, 3, X), 0, kept)

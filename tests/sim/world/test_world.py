@@ -1,6 +1,7 @@
 """The World: a field is its own whatever runs beside it, requests are checked, nothing explodes."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -379,6 +380,56 @@ def test_an_exact_view_is_the_truth():
         assert not s.age[0].any()
         truth = np.broadcast_to(world.truth.position[0], s.position[0].shape)
         np.testing.assert_allclose(s.position[0], truth, atol=1e-8)
+
+
+@pytest.mark.parametrize(("task", "config"), CASES)
+def test_a_field_goes_on_from_a_snapshot_as_it_went_on_then(task, config):
+    world = started(task, config, [1, 2, 3])
+    requests = Requests(world, [1, 2, 3])
+    for _ in range(50):
+        world.step(*requests.draw())
+    kept = pickle.loads(pickle.dumps(world.snapshot(1)))
+    further = [requests.draw() for _ in range(150)]
+    for action, target in further:
+        world.step(action, target)
+    expected = snapshot(world, 1)
+    elsewhere = started(task, config, [9, 8, 7])  # another World, another place in it
+    elsewhere.step(*Requests(elsewhere, [9, 8, 7]).draw())
+    for other, field in ((world, 1), (world, 2), (elsewhere, 0)):
+        other.restore(field, kept)
+        only = np.arange(3) == field
+        for action, target in further:
+            here = (np.roll(request, field - 1, axis=0) for request in (action, target))
+            other.step(*here, only)
+        assert_same(snapshot(other, field), expected)
+
+
+def test_fields_that_do_not_play_stand_still():
+    world = started(Task(3, 2), profile("v19"), [1, 2])
+    requests = Requests(world, [1, 2])
+    before = snapshot(world, 1)
+    for _ in range(30):
+        world.step(*requests.draw(), playing=np.array([True, False]))
+    assert_same(snapshot(world, 1), before)
+    assert world.truth.time.tolist() == [30, 0]
+
+
+def test_requests_on_fields_that_do_not_play_are_not_looked_at():
+    world = started(Task(3, 2), profile("2005"), [1, 2])
+    action, target = Requests(world, [1, 2]).draw()
+    action[1] = 77
+    world.step(action, target, playing=np.array([True, False]))
+    with pytest.raises(KeepawayError, match="keeper_1 on field 1 cannot carry out action=77"):
+        world.step(action, target)
+
+
+def test_a_snapshot_of_another_world_is_refused():
+    kept = started(Task(3, 2), profile("2005"), [1]).snapshot(0)
+    for other in (World(Task(3, 2), profile("v19")), World(Task(4, 3), profile("2005"))):
+        with pytest.raises(KeepawayError, match="a snapshot of another world"):
+            other.restore(0, kept)
+    with pytest.raises(KeepawayError, match=r"this world has fields 0\.\.0"):
+        World(Task(3, 2), profile("2005")).snapshot(1)
 
 
 def check_limits(world: World) -> None:
