@@ -399,8 +399,8 @@ def test_a_field_goes_on_from_a_snapshot_as_it_went_on_then(task, config):
         other.restore(field, kept)
         only = np.arange(3) == field
         for action, target in further:
-            here = (np.roll(request, field - 1, axis=0) for request in (action, target))
-            other.step(*here, only)
+            shift = field - 1  # the requests of field 1 to the field that takes its part
+            other.step(np.roll(action, shift, 0), np.roll(target, shift, 0), only)
         assert_same(snapshot(other, field), expected)
 
 
