@@ -13,43 +13,53 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import json
-import multiprocessing
 import os
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import Progress, StopRule, TrainerConfig, Trial, trial_seed
+from keepaway_sim.cli.interrupts import Interruption, Stopped
+from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer import metrics
 from keepaway_transfer.reports import plotting
 from keepaway_transfer.reports.statistics import mean_curve
 from keepaway_transfer.rho import Transfer, transferred
+from keepaway_transfer.studies.processes import WorkerExecutor
 
 SCRIPTS = Path(__file__).resolve().parent
 DOMAIN = 97  # the demo's own, unless one is set: it hears no other match
 THRESHOLD = 9.0  # [s] the paper's for 4v3
 CYCLES_PER_HOUR = 36000
 PROGRESS_EVERY = 10.0  # [s]
+MARK = "made_by_the_demo.txt"  # what an earlier demo made is replaced only beside this file
+MADE = ("3v2_nodes", "3v2_bag", "3v2_trained", "4v3_start.npz", "4v3_starts", "4v3_nodes",
+        "4v3_bag", "learning_curves.png")  # fmt: skip
+
+
+class DemoError(RuntimeError):
+    """A step that did not work."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Args:
     """How much of everything."""
 
-    out: Path = Path("out/demo")  # folder of all files; an earlier demo there is replaced
+    out: Path = Path("out/demo")  # folder of all files; what an earlier demo made there is replaced
     seed: int = 0  # every random number follows from it
     episodes: int = 60  # of the recorded 3v2 match
     source_hours: float = 6.0  # simulated, of 3v2 training of every trial
@@ -58,11 +68,40 @@ class Args:
 
 
 def main() -> int:
-    """Do the five steps; print a table and where everything is."""
+    """Do the five steps; a refusal is one line."""
     args = parse()
     os.environ.setdefault("ROS_DOMAIN_ID", str(DOMAIN))
-    shutil.rmtree(args.out, ignore_errors=True)
-    args.out.mkdir(parents=True)
+    try:
+        with Interruption():
+            begin(args.out)
+            return play(args)
+    except Stopped as stopped:
+        print(f"demo: stopped; what it made so far is in {args.out}", file=sys.stderr)
+        return stopped.code
+    except (DemoError, AgentError, KeepawayError, OSError) as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 1
+
+
+def begin(out: Path) -> None:
+    """Make the demo's folder; remove what an earlier demo made there, and nothing else.
+
+    Raises:
+        DemoError: the folder holds something, and no demo's mark.
+    """
+    if out.is_dir() and any(out.iterdir()) and not (out / MARK).is_file():
+        raise DemoError(f"{out} holds something that no demo made: name another folder (--out)")
+    out.mkdir(parents=True, exist_ok=True)
+    (out / MARK).write_text("scripts/demo replaces what it made in this folder.\n")
+    for path in (out / name for name in MADE):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def play(args: Args) -> int:
+    """Do the five steps; print a table and where everything is."""
     start = time.monotonic()
 
     def say(step: str) -> None:
@@ -103,7 +142,26 @@ def parse() -> Args:
 
 def script(name: str, *arguments: str) -> None:
     """Run a script of this folder; it shows its own progress."""
-    subprocess.run([sys.executable, str(SCRIPTS / name), *arguments], check=True)
+    with running([sys.executable, str(SCRIPTS / name), *arguments]):
+        pass
+
+
+@contextlib.contextmanager
+def running(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[str]]:
+    """A program, until it ends; it is asked to end when the demo is.
+
+    Raises:
+        DemoError: it failed.
+    """
+    with subprocess.Popen(command, text=True, **options) as process:
+        try:
+            yield process
+            process.wait()
+        except BaseException:
+            process.terminate()
+            raise
+    if process.returncode:
+        raise DemoError(f"{Path(command[1]).name} ended with {process.returncode}; see above")
 
 
 def match(
@@ -115,14 +173,12 @@ def match(
     command += ["--seed", str(args.seed), "--save-weights", str(weights), "--record", str(bag)]
     command += ["--load-weights", str(start)] if start else []
     lines: list[str] = []
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with running(command, stdout=subprocess.PIPE) as process:
         assert process.stdout
         for line in process.stdout:
             lines.append(line)
             if not line.startswith("{"):
                 print(line, end="", flush=True)
-    if process.returncode:
-        raise SystemExit(f"demo: {command[1]} ended with {process.returncode}; see above")
     summary: dict[str, Any] = json.loads(lines[-1])
     return summary
 
@@ -140,7 +196,7 @@ def transfer_by_node(source: Path, target: Path) -> str:
         try:
             client = node.create_client(ApplyRho, "transfer/apply")
             if not client.wait_for_service(timeout_sec=60.0):
-                raise SystemExit("demo: the transfer node does not come; see above")
+                raise DemoError("the transfer node does not come; see above")
             request = ApplyRho.Request(
                 source_path=str(source), target_task="4v3", variant="rho", target_path=str(target)
             )
@@ -152,7 +208,7 @@ def transfer_by_node(source: Path, target: Path) -> str:
             rclpy.shutdown()
             process.terminate()
     if response is None or not response.success:
-        raise SystemExit(f"demo: the transfer node refused: {response and response.message}")
+        raise DemoError(f"the transfer node refused: {response and response.message}")
     message: str = response.message
     return message
 
@@ -164,8 +220,7 @@ def study(args: Args, sources: Sequence[Path]) -> dict[str, list[np.ndarray]]:
         carried = transferred(load_weights(source), Transfer("4v3"))
         save_weights(args.out / "4v3_starts" / f"trial_{number:04d}.npz", carried)
         starts.append(carried.values)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as pool:
+    with WorkerExecutor(2) as pool:
         scratch = pool.submit(learn_4v3, args, [None] * len(starts), "from scratch")
         after = pool.submit(learn_4v3, args, starts, "after transfer")
         return {"from scratch": scratch.result(), "after transfer from 3v2": after.result()}

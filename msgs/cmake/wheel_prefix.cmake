@@ -6,7 +6,7 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 # The wheels' prefix is four folders above PREFIX/lib/pythonX.Y/site-packages/ament_package/__init__.py's own.
 execute_process(
   COMMAND "${Python3_EXECUTABLE}" -c
-    "import ament_package, pathlib; print(pathlib.Path(ament_package.__file__).resolve().parents[4].as_posix())"
+    "import ament_package, pathlib; print(pathlib.Path(ament_package.__file__).absolute().parents[4].as_posix())"
   OUTPUT_VARIABLE wheel_prefix
   OUTPUT_STRIP_TRAILING_WHITESPACE
   COMMAND_ERROR_IS_FATAL ANY
