@@ -153,7 +153,7 @@ def test_parameters_and_their_defaults(start: Callable[[str], Node], name: str) 
         if name not in (*EVERY_NODE_HAS, *world)
     }
     assert declared.keys() == documented.keys()
-    for parameter, (default, unit, meaning) in documented.items():
+    for parameter, (default, unit, _, meaning) in documented.items():
         if parameter != "path":
             value = declared[parameter]
             assert default == (str(value).lower() if isinstance(value, bool) else str(value))

@@ -65,7 +65,7 @@ class Range(NamedTuple):
 
     def __str__(self) -> str:
         """In words, after "a number": "from 0 to 1", "above 0 and up to 360"."""
-        low, high = f"{self.low:.12g}", f"{self.high:.12g}"
+        low, high = _written(self.low), _written(self.high)
         if self.has_low and self.has_high:
             return f"from {low} to {high}"
         if math.isinf(self.high):
@@ -212,9 +212,9 @@ def flat(instance: Any) -> dict[str, Any]:
     return values
 
 
-def table(settings: type) -> str:
+def table(settings: type, heading: str = "setting") -> str:
     """The settings of a class as a table in Markdown."""
-    rows = ["| setting | default | unit | range | what it is |", "|---|---|---|---|---|"]
+    rows = [f"| {heading} | default | unit | range | what it is |", "|---|---|---|---|---|"]
     for declared in settings_of(settings).values():
         cells = (f"`{declared.name}`", as_text(declared.default), declared.unit, limits(declared))
         rows.append(f"| {' | '.join((*cells, declared.text))} |")
@@ -233,10 +233,15 @@ def limits(declared: Setting) -> str:
     low, high = declared.range.low, declared.range.high
     if declared.kind not in (int, float) or declared.range == EVERY_NUMBER:
         return ""
-    lowest = f"{'' if declared.range.has_low else '> '}{low:.12g}"
+    lowest = f"{'' if declared.range.has_low else '> '}{_written(low)}"
     if math.isinf(high):
         return lowest if not declared.range.has_low else f"{lowest} or more"
-    return f"{lowest} to {'' if declared.range.has_high else '< '}{high:.12g}"
+    return f"{lowest} to {'' if declared.range.has_high else '< '}{_written(high)}"
+
+
+def _written(number: float) -> str:
+    """An end of a range as people write it."""
+    return "2^63" if number == 2.0**63 else f"{number:.12g}"
 
 
 def _is_number(value: Any) -> bool:
