@@ -6,8 +6,9 @@
     .venv/bin/python scripts/checks/house.py --write      # the tables in READMEs and docs/
 
 Counted are functions of more than 50 lines or 8 parameters, modules of more than 400 lines, and
-public names that more than one module of the packages defines at its top. Tables stand between `<!-- table: modules -->` or `<!-- table: parameter NAME -->`
-(or `setting`) and `<!-- end of table -->`; tests hold them to the code.
+public names that more than one module of the packages defines at its top. Tables stand between
+`<!-- table: modules -->` or `<!-- table: parameter NAME -->` (or `setting`) and
+`<!-- end of table -->`; tests hold them to the code.
 """
 
 import argparse
