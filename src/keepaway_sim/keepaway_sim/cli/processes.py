@@ -7,8 +7,8 @@ kernel tells them to end.
 
 from __future__ import annotations
 
-import ctypes
-import signal
+import os
+import shutil
 import subprocess
 import sys
 import time
@@ -16,8 +16,18 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import NamedTuple, Self
 
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)
+_LAUNCHER = """
+import ctypes, os, signal, sys
+PR_SET_PDEATHSIG = 1
+ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+if os.getppid() != int(sys.argv[1]):
+    sys.exit("its starter has ended")
+os.execvp(sys.argv[2], sys.argv[2:])
+"""
+"""Becomes the program that it is given, which the kernel ends (SIGTERM) when the starter dies.
+
+A program of its own, as Python must not run between fork and exec where there are threads.
+"""
 
 
 class Ended(NamedTuple):
@@ -46,12 +56,13 @@ class Processes:
         Raises:
             OSError: there is no such program.
         """
+        if shutil.which(command[0], path=self._env.get("PATH")) is None:
+            raise FileNotFoundError(f"{command[0]}: no such program")
         self._running[name] = subprocess.Popen(
-            command,
+            [sys.executable, "-I", "-S", "-c", _LAUNCHER, str(os.getpid()), *command],
             env=self._env,
             stdin=subprocess.DEVNULL,
             start_new_session=True,
-            preexec_fn=_end_with_parent,
         )
 
     def pid(self, name: str) -> int:
@@ -114,8 +125,3 @@ def script_command(words: Sequence[str]) -> list[str]:
     ['./my_agent', '--brave']
     """
     return [sys.executable, *words] if words[0].endswith(".py") else list(words)
-
-
-def _end_with_parent() -> None:
-    """In the child: be told to end (SIGTERM) when the parent dies, however it dies."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

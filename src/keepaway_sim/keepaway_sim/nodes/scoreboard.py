@@ -8,6 +8,7 @@ from typing import Any, TextIO
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from tqdm import tqdm
 
 from keepaway_msgs.msg import Episode
 from keepaway_sim.match.scores import Score, summary
@@ -44,6 +45,7 @@ class Scoreboard(Node):
         self.troubles: dict[str, dict[str, int]] = {}
         self._num_wanted, self._out = num_wanted, out
         self._show_at = 0.0
+        self._bar: tqdm[Any] | None = None
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_health, QUEUE)
 
@@ -74,28 +76,35 @@ class Scoreboard(Node):
         now = time.monotonic()
         if now < self._show_at or not self.episodes:
             return
-        is_terminal = self._out.isatty()
-        self._show_at = now + (TERMINAL_PERIOD if is_terminal else FILE_PERIOD)
-        self._out.write(f"\r\x1b[K{self._line()}" if is_terminal else f"{self._line()}\n")
-        self._out.flush()
+        bar = self._bar = self._bar or self._opened_bar()
+        bar.set_postfix_str(self._words(), refresh=False)
+        bar.update(len(self.episodes) - bar.n)
+        if bar.disable:  # the output is no terminal
+            self._out.write(f"{len(self.episodes)} episodes, {self._words()}\n")
+            self._out.flush()
+        else:
+            bar.refresh()
+        self._show_at = now + (FILE_PERIOD if bar.disable else TERMINAL_PERIOD)
 
     def conclude(self) -> None:
-        """Make the last report, and end its line."""
+        """Make the last report."""
         self._show_at = 0.0
         self.show()
-        if self._out.isatty():
-            self._out.write("\n")
+        if self._bar is not None:
+            self._bar.close()
 
-    def _line(self) -> str:
+    def _opened_bar(self) -> tqdm[Any]:
+        return tqdm(total=self._num_wanted or None, unit=" episodes", disable=None, file=self._out)
+
+    def _words(self) -> str:
         recent = summary(
             [score(self.episodes[number]) for number in sorted(self.episodes)[-RECENT:]]
         )
         mean = recent["mean_duration_s"]
-        of = f"/{self._num_wanted}" if self._num_wanted else ""
-        held = f", last {recent['episodes']} held {mean:.2f} s" if mean is not None else ""
+        held = f"last {recent['episodes']} held {mean:.2f} s, " if mean is not None else ""
         rate = self.figures.get("cycles_per_second", "0")
-        pace = f", {rate} cycles/s" if rate != "0" else ""  # at first it is not known yet
-        return f"{len(self.episodes)}{of} episodes{held}{pace}, {self.state}"
+        pace = f"{rate} cycles/s, " if rate != "0" else ""  # at first it is not known yet
+        return f"{held}{pace}{self.state}"
 
     def _on_episode(self, message: Episode) -> None:
         self.episodes[message.number] = message

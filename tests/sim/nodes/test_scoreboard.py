@@ -1,0 +1,68 @@
+"""What the scoreboard shows of a match."""
+
+import io
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+
+from keepaway_msgs.msg import Episode
+from keepaway_sim.nodes.scoreboard import Scoreboard
+from keepaway_sim.task import Outcome
+
+
+class Terminal(io.StringIO):
+    """Takes what is written as a terminal would."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def context(ros_domain: int) -> Iterator[rclpy.Context]:
+    made = rclpy.Context()
+    rclpy.init(context=made, domain_id=ros_domain)
+    yield made
+    rclpy.shutdown(context=made)
+
+
+def play(board: Scoreboard, count: int) -> None:
+    for number in range(count):
+        episode = Episode(number=number, cycles=50, duration=5.0, outcome=Outcome.TAKEN_AWAY)
+        board._on_episode(episode)
+        board.show()
+    board.conclude()
+
+
+def test_a_file_gets_lines(context: rclpy.Context) -> None:
+    out = io.StringIO()
+    board = Scoreboard(4, out=out, context=context)
+    play(board, 3)
+    first, last = out.getvalue().splitlines()
+    assert first == "1 episodes, last 1 held 5.00 s, no simulator was heard"
+    assert last == "3 episodes, last 3 held 5.00 s, no simulator was heard"
+
+
+def test_a_terminal_gets_one_bar(context: rclpy.Context) -> None:
+    out = Terminal()
+    play(Scoreboard(4, out=out, context=context), 3)
+    last = out.getvalue().split("\r")[-1]
+    assert "3/4" in last
+    assert "last 3 held 5.00 s" in last
+    assert out.getvalue().count("\n") == 1
+
+
+def test_nothing_is_shown_before_an_episode_has_ended(context: rclpy.Context) -> None:
+    out = Terminal()
+    board = Scoreboard(0, out=out, context=context)
+    board.show()
+    board.conclude()
+    assert out.getvalue() == ""
+
+
+def test_the_match_in_numbers(context: rclpy.Context) -> None:
+    board = Scoreboard(2, out=io.StringIO(), context=context)
+    play(board, 2)
+    numbers = board.summary()
+    assert (numbers["episodes"], numbers["mean_duration_s"]) == (2, 5.0)
+    assert (numbers["episode_cycles"], board.next_episode) == ([50, 50], 2)
