@@ -69,16 +69,21 @@ def main() -> int:
 
 def check(path: Path, number: int) -> int:
     """Say whether the recorded match replays."""
+    differs = False
     try:
         bag = MatchBag(path, number)
-        world, players = check_world(bag), check_decisions(bag)
+        for who, what, run in (
+            ("the world", "cycles", check_world),
+            ("players", "decisions", check_decisions),
+        ):
+            checked = run(bag)
+            verdict = checked.difference or "the same, all of them"
+            print(f"{who}: {checked.episodes} episodes, {checked.compared} {what}: {verdict}")
+            differs |= checked.difference is not None
     except (KeepawayError, AgentError) as error:
         print(f"replay: {error}", file=sys.stderr)
         return 1
-    for who, what, checked in (("the world", "cycles", world), ("players", "decisions", players)):
-        verdict = checked.difference or "the same, all of them"
-        print(f"{who}: {checked.episodes} episodes, {checked.compared} {what}: {verdict}")
-    return int(bool(world.difference or players.difference))
+    return int(differs)
 
 
 @contextmanager

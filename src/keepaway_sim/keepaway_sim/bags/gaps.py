@@ -189,6 +189,7 @@ class GapCounter:
         if not self.received:
             return "; ".join(["no perception and no state was recorded", *self.problems])
         parts = losses or [f"nothing is missing of {self.received} perceptions and states"]
+        parts += self.problems
         again = self.repeated + sum(count.repeated for count in self.topics.values())
         if again:
             parts = [*parts, f"{again} messages came more than once, and count once"]
@@ -206,7 +207,7 @@ class GapCounter:
         if ends:
             named = ", ".join(map(str, ends[:_MOST_NAMED])) + ", .." * (len(ends) > _MOST_NAMED)
             parts.append(f"{len(ends)} episodes miss their end ({named})")
-        return parts + self.problems
+        return parts
 
     def complete_until(self) -> int:
         """Simulated time [ns] that every topic that comes each cycle has reached; -1: none yet."""

@@ -150,7 +150,7 @@ def _decoded(reader: BagReader, codec: Any, data: bytes) -> dict[str, Any]:
 def _raw_messages(reader: BagReader, topic: str) -> Iterator[tuple[int, int, bytes]]:
     number = reader.number(topic)
     for at, place in enumerate(reader.places):
-        if not place.file.may_have(place.chunk, (topic,)):
+        if not place.file.may_have(place.run, (topic,)):
             continue
         data, found, _ = reader.load(place)
         for row in np.flatnonzero(found[:, 0] == number).tolist():
@@ -217,7 +217,7 @@ def _index_place(
         if codec.message_type == FIELD_STATE:
             _note_last(match, heads, keys)
     if high >= 0:
-        match.pieces.append(Piece(low, high, place.chunk.size, at))
+        match.pieces.append(Piece(low, high, place.run.size, at))
 
 
 def _layouts(reader: BagReader, match: Found) -> dict[int, Any]:

@@ -7,7 +7,7 @@ once for each window that they reach into: memory is bounded, whatever the order
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,10 +41,11 @@ def merged(pieces: Iterable[Piece], load: Callable[[Any], Block]) -> Iterator[Bl
     floor = -(2**63)
     while waiting:
         top = _first_top(waiting)
-        kept, top = _gather(waiting, load, floor, top)
-        if top is not None and top == floor:  # one key, of more messages than fit
-            yield from (_sorted([block]) for block in kept)
-            floor = yield from _only(waiting, load, floor, len(kept))
+        kept, top, only = _gather(waiting, load, floor, top)
+        if only is not None:
+            yield from kept
+            yield from _rest_of(waiting[len(kept) :], load, only)
+            floor = only + 1
         else:
             if sum(len(block.rows) for block in kept):
                 yield _sorted(kept)
@@ -66,10 +67,12 @@ def _first_top(waiting: Sequence[Piece]) -> int | None:
 
 def _gather(
     waiting: Sequence[Piece], load: Callable[[Any], Block], floor: int, top: int | None
-) -> tuple[list[Block], int | None]:
+) -> tuple[list[Block], int | None, int | None]:
     """The messages of floor <= key < top, with a lower top where they do not fit.
 
-    A top that is the floor means: all gathered have that one key, and there may be more.
+    Returns:
+        them; the top; and where even those of one key do not fit, that key: then there may be
+        more of it in the pieces that come after the gathered.
     """
     kept: list[Block] = []
     size = 0
@@ -86,25 +89,17 @@ def _gather(
             kept = [_cut(block, floor, top) for block in kept]
             size = sum(len(block.data) for block in kept)
             if size > 2 * WINDOW_SIZE and top == low + 1:
-                return kept, _only_key(kept, low)
-    return kept, top
+                return kept, top, low
+    return kept, top, None
 
 
-def _only_key(kept: list[Block], key: int) -> int:
-    kept[:] = [_cut(block, key, key + 1) for block in kept]
-    return key
-
-
-def _only(
-    waiting: Sequence[Piece], load: Callable[[Any], Block], floor: int, done: int
-) -> Generator[Block, None, int]:
-    """The messages of one key, from the pieces that are not done yet; returns the next floor."""
-    for piece in waiting[done:]:
-        if piece.low <= floor <= piece.high:
-            block = _cut(load(piece.source), floor, floor + 1)
+def _rest_of(pieces: Sequence[Piece], load: Callable[[Any], Block], key: int) -> Iterator[Block]:
+    """The messages of one key in some pieces."""
+    for piece in pieces:
+        if piece.low <= key <= piece.high:
+            block = _cut(load(piece.source), key, key + 1)
             if len(block.rows):
                 yield block
-    return floor + 1
 
 
 def _cut(block: Block, floor: int, top: int | None) -> Block:

@@ -10,8 +10,9 @@ from collections.abc import Collection, Iterator
 
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.timeline import Timeline
-from keepaway_sim.bags.topics import Recorded
+from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.wire import cdr
 from keepaway_sim.wire.messages import SECOND
 
 
@@ -161,3 +162,22 @@ def episode_times(bag: MatchBag, first: int, last: int) -> tuple[int, int]:
         known = f"{episodes[0].number}..{episodes[-1].number}" if episodes else "none"
         raise KeepawayError(f"episodes {first}..{last}: {bag.reader.path} has {known}")
     return wanted[0].start, wanted[-1].end + 1
+
+
+def difference_from_installed(topic: Topic) -> str:
+    """How a recorded topic's type differs from the installed one; empty where it does not.
+
+    Raises:
+        KeepawayError: its type is not installed, or it is not ROS 2's.
+    """
+    if not topic.is_ros:
+        raise KeepawayError(f"its messages are not ROS 2's ({topic.schema_encoding or 'no type'})")
+    installed = cdr.codec(topic.message_type)
+    hash_ = cdr.type_hash(topic.message_type)
+    try:
+        recorded = cdr.Codec(topic.message_type, topic.definition)
+    except (ValueError, RecursionError):
+        return f"its definition of {topic.message_type} cannot be read"
+    if topic.type_hash not in ("", hash_) or not recorded.is_laid_out_like(installed):
+        return f"it was recorded with another {topic.message_type} than the installed one"
+    return ""

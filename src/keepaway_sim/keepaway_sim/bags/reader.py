@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from keepaway_sim.bags.chunks import Run
 from keepaway_sim.bags.files import bag_files
-from keepaway_sim.bags.mcap_reader import Chunk, McapFile
+from keepaway_sim.bags.mcap_reader import McapFile
 from keepaway_sim.bags.merging import Block, Piece, merged
 from keepaway_sim.bags.topics import Batch, Recorded, Topic
 from keepaway_sim.errors import KeepawayError
@@ -19,10 +20,10 @@ _MOST_FILES = 10_000
 
 
 class Place(NamedTuple):
-    """A chunk of a file."""
+    """Chunks of a file that are read together."""
 
     file: McapFile
-    chunk: Chunk
+    run: Run
 
 
 Choice = Callable[[int, np.ndarray], np.ndarray]
@@ -77,9 +78,9 @@ class BagReader:
                 f" the files have {self.message_count:,}"
             )
         self.complete = all(file.complete for file in self._files)
-        self.places = [Place(file, chunk) for file in self._files for chunk in file.chunks]
-        self.start_time = min((place.chunk.start_time for place in self.places), default=0)
-        self.end_time = max((place.chunk.end_time for place in self.places), default=0)
+        self.places = [Place(file, run) for file in self._files for run in file.runs]
+        self.start_time = min((place.run.start_time for place in self.places), default=0)
+        self.end_time = max((place.run.end_time for place in self.places), default=0)
 
     @property
     def message_count(self) -> int:
@@ -131,12 +132,12 @@ class BagReader:
             raise KeepawayError(f"{self.path}: {topic.name}: {error}") from error
 
     def load(self, place: Place) -> Block:
-        """The messages of one chunk, with their log times as keys.
+        """The messages of one place, with their log times as keys.
 
         Raises:
             KeepawayError: it is damaged.
         """
-        data, rows = place.file.unpack(place.chunk)
+        data, rows = place.file.unpack(place.run)
         rows = rows.copy()
         rows[:, 0] = self._renumbered(place.file, rows[:, 0])
         return Block(data, rows, rows[:, 1])
@@ -172,13 +173,20 @@ class BagReader:
             return Block(block.data, block.rows[own], block.keys[own])
 
         pieces = [
-            Piece(chunk.start_time, chunk.end_time, chunk.size, number)
-            for number, place in enumerate(self.places)
-            for chunk in [place.chunk]
-            if chunk.end_time >= low and chunk.start_time <= high
-            if topics is None or place.file.may_have(chunk, topics)
+            Piece(run.start_time, run.end_time, run.size, number)
+            for number, (file, run) in enumerate(self.places)
+            if run.end_time >= low and run.start_time <= high
+            if topics is None or file.may_have(run, topics)
         ]
         return merged(pieces, load)
+
+    def stored(self) -> Iterator[Block]:
+        """All messages as they stand in the files, which may be another order than of time.
+
+        Raises:
+            KeepawayError: a damaged chunk.
+        """
+        return map(self.load, self.places)
 
     def messages(
         self,

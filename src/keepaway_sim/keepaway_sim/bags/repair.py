@@ -29,7 +29,7 @@ def repair(path: Path | str, output: Path | str) -> BagReader:
             whole.copy_topic(topic)
         for name, data in broken.attachments():
             whole.attach(name, data)
-        for data, rows, _ in broken.blocks():
+        for data, rows, _ in broken.stored():
             for number, time, first, last in rows.tolist():
                 kind = broken.kinds[number]
                 if kind.message_type != broken.topics[kind.name].message_type:

@@ -66,24 +66,30 @@ def whole_episodes(bag: MatchBag) -> Iterator[tuple[EpisodeSummary, Track]]:
     """Every finished episode with its track.
 
     Raises:
-        KeepawayError: a cycle is missing.
+        KeepawayError: a cycle is missing, or someone's perceptions, or every episode's end.
     """
     waiting = list(bag.episodes())
+    if not waiting:
+        raise KeepawayError(f"{bag.reader.path} has no episode's end, so none to play again")
     for episode, track in bag.tracks(waiting):
-        _check_whole(bag, waiting.pop(0), episode, len(track.time))
+        due = waiting.pop(0)
+        _check_whole(bag, due, track if due is episode else None)
         yield episode, track
     for episode in waiting:
-        _check_whole(bag, episode, episode, 0)
+        _check_whole(bag, episode, None)
 
 
-def _check_whole(bag: MatchBag, due: EpisodeSummary, episode: EpisodeSummary, found: int) -> None:
-    """Whether the episode that is due came, with all its cycles."""
-    found = found if episode is due else 0
-    expected = due.cycles + 1 + (due.outcome == Outcome.ABORTED)
-    if found != expected:
-        raise KeepawayError(
-            f"{bag.reader.path}: episode {due.number} has {found} of its {expected} field states"
-        )
+def _check_whole(bag: MatchBag, episode: EpisodeSummary, track: Track | None) -> None:
+    """Whether all cycles of an episode came."""
+    found = 0 if track is None else len(track.time)
+    expected = episode.cycles + 1 + (episode.outcome == Outcome.ABORTED)
+    where = f"{bag.reader.path}: episode {episode.number}"
+    if track is None or found != expected:
+        raise KeepawayError(f"{where} has {found} of its {expected} field states")
+    absent = np.isnan(track.believed).all(axis=(2, 3)).sum(axis=0)
+    for name, count in zip(bag.match["player_names"], absent.tolist(), strict=True):
+        if count:
+            raise KeepawayError(f"{where} lacks {count} perceptions of {name}")
 
 
 def _compare(world: World, track: Track, row: int) -> Difference | None:

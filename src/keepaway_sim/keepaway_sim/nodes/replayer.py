@@ -25,7 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.bags.playback import Playback, episode_times
+from keepaway_sim.bags.playback import Playback, difference_from_installed, episode_times
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
@@ -33,7 +33,6 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.subscribing import message_class, to_profile
 from keepaway_sim.settings import setting
-from keepaway_sim.wire import cdr
 from keepaway_sim.wire.messages import SECOND
 
 HISTORY = 2000
@@ -172,6 +171,8 @@ class Replayer(Node):
             topic = timeline.topics.get(name)
             try:
                 difference = difference_from_installed(topic) if topic else ""
+                if topic:
+                    message_class(topic.message_type)
             except KeepawayError as error:
                 self.get_logger().warning(f"{name} is left out: {str(error).splitlines()[0]}")
                 continue
@@ -218,26 +219,6 @@ class Replayer(Node):
             return response
 
         return serve
-
-
-def difference_from_installed(topic: Topic) -> str:
-    """How a recorded topic's type differs from the installed one; empty where it does not.
-
-    Raises:
-        KeepawayError: its type is not installed, or it is not ROS 2's.
-    """
-    if not topic.is_ros:
-        raise KeepawayError(f"its messages are not ROS 2's ({topic.schema_encoding or 'no type'})")
-    message_class(topic.message_type)
-    installed = cdr.codec(topic.message_type)
-    hash_ = cdr.type_hash(topic.message_type)
-    try:
-        recorded = cdr.Codec(topic.message_type, topic.definition)
-    except (ValueError, RecursionError):
-        return f"its definition of {topic.message_type} cannot be read"
-    if topic.type_hash not in ("", hash_) or not recorded.is_laid_out_like(installed):
-        return f"it was recorded with another {topic.message_type} than the installed one"
-    return ""
 
 
 def _range(text: str) -> tuple[int, int]:

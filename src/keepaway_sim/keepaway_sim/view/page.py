@@ -148,6 +148,9 @@ def replay_page(
     rest = bag.unfinished()
     if rest is not None:
         episodes.append(rest)
+    gaps = count_gaps(bag).report()
+    if not episodes:
+        raise KeepawayError(f"{path} has no episode to show: {gaps}")
     wanted = chosen_episodes(episodes, numbers, max_cycles)
     shown = {
         episode.number: encoded(frames(track, bag.task))
@@ -157,7 +160,6 @@ def replay_page(
         episode_data(e) | ({"frames": shown[e.number]} if e.number in shown else {})
         for e in episodes
     ]
-    gaps = count_gaps(bag).report()
     facts = _who_played(bag)
     data = {"live": False, "match": match_data(bag.match, [*facts, gaps]), "episodes": entries}
     return page(data), gaps

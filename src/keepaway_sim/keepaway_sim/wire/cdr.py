@@ -292,7 +292,9 @@ def type_hash(message_type: str) -> str:
 
 
 def _installed(message_type: str, suffix: str) -> Path:
-    package, name = _short(message_type).split("/")
+    package, _, name = _short(message_type).partition("/")
+    if not re.fullmatch(r"[a-z]\w*/[A-Z]\w*", f"{package}/{name}"):
+        raise KeepawayError(f"{message_type[:100]!r} is no message's type")
     prefixes = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
     for prefix in filter(None, prefixes):
         path = Path(prefix) / "share" / package / "msg" / f"{name}.{suffix}"

@@ -1,0 +1,165 @@
+"""Chunks of an MCAP file: where they are, their bytes, and the records in them.
+
+All messages of a chunk are indexed at once by compiled code: the `mcap` library makes a Python
+object of each message, which takes 6 times as long (docs/recordings.md has the figures).
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import IO, NamedTuple
+
+import lz4.frame
+import numpy as np
+import zstandard
+from numba import njit
+
+from keepaway_sim.errors import KeepawayError
+
+MAX_CHUNK_SIZE = 2**26  # [bytes] unpacked; writers make chunks of about 1 MB
+LOOSE_SIZE = 2**20  # [bytes] of messages outside chunks that are read together
+_ZSTD = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_SIZE)
+
+
+class Chunk(NamedTuple):
+    """Where a chunk is in its file, and of when; of messages outside chunks, where they are."""
+
+    start_time: int
+    end_time: int
+    size: int  # [bytes] unpacked
+    crc: int
+    compression: str
+    offset: int  # of its packed data
+    length: int
+    is_loose: bool = False  # no chunk, but messages outside chunks
+
+
+class Run(NamedTuple):
+    """Chunks that are read together: one, or several small ones that follow each other."""
+
+    chunks: tuple[Chunk, ...]
+
+    @property
+    def size(self) -> int:
+        """Unpacked [bytes]."""
+        return sum(chunk.size for chunk in self.chunks)
+
+    @property
+    def start_time(self) -> int:
+        """Of its messages [ns]; that of chunks without messages is 0."""
+        return min(chunk.start_time for chunk in self.chunks)
+
+    @property
+    def end_time(self) -> int:
+        """Of its messages [ns]."""
+        return max(chunk.end_time for chunk in self.chunks)
+
+
+def read_chunk(stream: IO[bytes], limit: int) -> Chunk:
+    """Where a chunk is whose record ends at `limit`."""
+    start, end, size, crc, length = struct.unpack("<QQQII", stream.read(32))
+    if length > limit - stream.tell():
+        raise KeepawayError(f"a chunk whose compression's name has {length:,} bytes")
+    compression = stream.read(length).decode()
+    (packed,) = struct.unpack("<Q", stream.read(8))
+    if size > MAX_CHUNK_SIZE or stream.tell() + packed > limit:
+        raise KeepawayError(f"a chunk of {size:,} bytes, {packed:,} of them packed")
+    if max(start, end) >= 2**63:
+        raise KeepawayError(f"a chunk's time is {max(start, end)} ns, beyond 64 bits with a sign")
+    return Chunk(start, end, size, crc, compression, stream.tell(), packed)
+
+
+def together(chunks: list[Chunk], alone: bool) -> Iterator[tuple[Chunk, ...]]:
+    """Chunks that follow each other, as many as are small; each alone, if that is wanted."""
+    gathered: list[Chunk] = []
+    size = 0
+    for chunk in chunks:
+        if gathered and (alone or chunk.is_loose or size + chunk.size > LOOSE_SIZE):
+            yield tuple(gathered)
+            gathered, size = [], 0
+        gathered.append(chunk)
+        size += LOOSE_SIZE if chunk.is_loose else chunk.size
+    if gathered:
+        yield tuple(gathered)
+
+
+def read_packed(stream: IO[bytes], chunk: Chunk) -> bytes:
+    """A chunk's bytes, unpacked.
+
+    Raises:
+        KeepawayError: they are not what was written.
+    """
+    stream.seek(chunk.offset)
+    data = _decompress(chunk, stream.read(chunk.length))
+    if chunk.crc and zlib.crc32(data) != chunk.crc:
+        raise KeepawayError(f"the chunk at {chunk.offset} is damaged")
+    return data
+
+
+def _decompress(chunk: Chunk, packed: bytes) -> bytes:
+    data = packed
+    if chunk.compression == "zstd":
+        data = unzstd(packed, chunk.size)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(packed, chunk.size)
+    elif chunk.compression:
+        raise KeepawayError(f"compression {chunk.compression!r} is not known")
+    if len(data) != chunk.size:
+        raise KeepawayError(f"a chunk of {len(data):,} bytes that should have {chunk.size:,}")
+    return data
+
+
+def unzstd(packed: bytes, most: int) -> bytes:
+    """Unpacked, if it has `most` bytes or fewer."""
+    if zstandard.frame_content_size(packed) > most:
+        raise KeepawayError("a chunk larger than it claims")
+    return bytes(_ZSTD.decompress(packed, most))
+
+
+@njit(cache=True)
+def index_records(data, is_loose=False):
+    """Where the records in a chunk are, or those that stand outside chunks.
+
+    Returns:
+        (n, 4) int64 of messages: channel, log time, first and last byte of the payload;
+        (m, 3) int64 of schemas and channels: opcode, first and last byte;
+        where the first record begins that was not read;
+        whether the records up to there are whole. Outside chunks, reading ends with a record of
+        another kind, or with one that is not all in the data.
+    """
+    num_messages, num_definitions, end, is_whole = 0, 0, 0, True
+    while end + 9 <= len(data):
+        opcode, length = data[end], _unsigned(data, end + 1, 8)
+        if is_loose and (opcode < 3 or opcode > 5):
+            break
+        if length < 0 or length > len(data) - end - 9 or (opcode == 5 and length < 22):
+            is_whole = is_loose
+            break
+        num_messages += opcode == 5
+        num_definitions += opcode == 3 or opcode == 4
+        end += 9 + length
+    messages = np.empty((num_messages, 4), np.int64)
+    definitions = np.empty((num_definitions, 3), np.int64)
+    position, m, d = 0, 0, 0
+    while position < end and position + 9 <= len(data):
+        opcode, body = data[position], position + 9
+        position = body + _unsigned(data, position + 1, 8)
+        if opcode == 5:
+            messages[m, 0] = _unsigned(data, body, 2)
+            messages[m, 1] = _unsigned(data, body + 6, 8)
+            messages[m, 2], messages[m, 3] = body + 22, position
+            m += 1
+        elif opcode == 3 or opcode == 4:
+            definitions[d, 0], definitions[d, 1], definitions[d, 2] = opcode, body, position
+            d += 1
+    return messages, definitions, end, is_whole
+
+
+@njit(cache=True, inline="always")
+def _unsigned(data, start, size):
+    value = np.int64(0)
+    for k in range(size):
+        value |= np.int64(data[start + k]) << (8 * k)
+    return value
