@@ -33,6 +33,7 @@ from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
 from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.match.beginning import random_match_id
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
@@ -45,7 +46,7 @@ START_TIMEOUT = 300.0  # [s] for everybody to come; so much because a first star
 END_TIMEOUT = 15.0  # [s] for everybody to save and end
 MATCH_OPTIONS = (
     *("task", "field", "seed", "speed", "episodes", "answer_timeout"),
-    *("record", "wait_for_recorder"),
+    *("record", "wait_for_recorder", "force"),
 )
 WORLD_OPTIONS = ("profile", "visible_angle_deg")
 MOST_UNHEARD = 1000  # messages that may still wait to be taken in at the end
@@ -77,7 +78,8 @@ def main() -> int:
         task = Task.parse(args.task, args.field)
         seat_agents(args, task)
         check_files(args)
-        board = Scoreboard(args.episodes, namespace=args.namespace)
+        args.match_id = random_match_id()
+        board = Scoreboard(args.episodes, args.match_id, namespace=args.namespace)
         executor.add_node(board)
         play = play_in_one_process if args.single_process else play_in_processes
         play(args, members(args, task), board, executor, told)
@@ -117,7 +119,7 @@ def seat_agents(args: argparse.Namespace, task: Task) -> None:
 
 def members(args: argparse.Namespace, task: Task) -> list[Member]:
     """Every node of the match and how it is started."""
-    settings = {name: vars(args)[name] for name in MATCH_OPTIONS + WORLD_OPTIONS}
+    settings = {name: vars(args)[name] for name in ("match_id", *MATCH_OPTIONS, *WORLD_OPTIONS)}
     players = {
         name: player_settings(args, name, task.role(p)) for p, name in enumerate(task.player_names)
     }

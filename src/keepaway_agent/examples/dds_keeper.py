@@ -61,6 +61,14 @@ class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
 
 
 @dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    """As in std_msgs."""
+
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
 class Match(IdlStruct, typename="keepaway_msgs::msg::dds_::Match_"):
     """As in keepaway_msgs."""
 
@@ -78,6 +86,8 @@ class Match(IdlStruct, typename="keepaway_msgs::msg::dds_::Match_"):
     code_version: str
     config_json: str
     first_episode: uint32
+    match_id: uint64
+    visible_angle_deg: float64
 
 
 @dataclass
@@ -97,6 +107,8 @@ class Perception(IdlStruct, typename="keepaway_msgs::msg::dds_::Perception_"):
     velocities: sequence[float64]
     ages: sequence[uint16]
     cycles_to_ball: sequence[uint16]
+    match_id: uint64
+    header: Header
 
 
 @dataclass
@@ -109,6 +121,7 @@ class ActionRequest(IdlStruct, typename="keepaway_msgs::msg::dds_::ActionRequest
     action: uint8
     target: uint8 = 0
     action_values: sequence[float64] = field(default_factory=list)
+    match_id: uint64 = 0
 
 
 @dataclass
@@ -123,6 +136,7 @@ class AgentStatus(IdlStruct, typename="keepaway_msgs::msg::dds_::AgentStatus_"):
     episodes: uint32 = 0
     simulated_hours: float64 = 0.0
     code_version: str = ""
+    match_id: uint64 = 0
 
 
 def choose(seen: Perception, index: int) -> int:
@@ -152,13 +166,15 @@ def play(name: str, participant: DomainParticipant) -> None:
         for match in matches.take(1):
             if isinstance(match, Match):
                 index, num_players = match.player_names.index(name), len(match.player_names)
-                status.write(AgentStatus(index, name, "dds"))
+                status.write(AgentStatus(index, name, "dds", match_id=match.match_id))
         for seen in perceptions.take(10):
             if not isinstance(seen, Perception) or len(seen.cycles_to_ball) != num_players:
                 continue
             if seen.decision_due:
                 action = choose(seen, index)
-                requests.write(ActionRequest(index, seen.episode, seen.cycle, action))
+                requests.write(
+                    ActionRequest(index, seen.episode, seen.cycle, action, match_id=seen.match_id)
+                )
 
 
 def main() -> None:

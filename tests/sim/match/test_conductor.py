@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.beginning import begin_match
 from keepaway_sim.match.conductor import LOG_PERIOD, Conductor
 from keepaway_sim.match.settings import MatchSettings
@@ -268,3 +269,61 @@ def test_players_may_take_in_the_end_before_the_simulator_leaves() -> None:
     assert len(ended) == 1
     assert stage.now - then < 1.0
     assert stage.recorded[-1] == "taker_2/status"
+
+
+def match_of_another(stage: Stage) -> bytes:
+    return codec(messages.MATCH).encode({"task": "4v3", "match_id": stage.match.match_id + 1})
+
+
+def test_a_simulator_that_finds_another_one_refuses_to_play() -> None:
+    stage = Stage(episodes=1)
+    stage.arrive()
+    stage.match.take_match(match_of_another(stage), b"")
+    with pytest.raises(KeepawayError, match=r"another simulator .* \(4v3\): choose .* force:=true"):
+        stage.play()
+    assert stage.match.num_cycles == 0
+
+
+@pytest.mark.parametrize("is_forced", [True, False])
+def test_a_match_that_is_running_goes_on_and_warns_of_another_simulator(is_forced: bool) -> None:
+    stage = Stage(episodes=1, seed=5, force=is_forced)
+    stage.arrive()
+    if not is_forced:
+        stage.play(until=lambda: stage.match.num_cycles == 3)
+    stage.match.take_match(match_of_another(stage), b"")
+    stage.match.take_match(b"nonsense", b"")
+    stage.play()
+    assert stage.ended() == played_alone(1, seed=5)
+    assert [text for text in stage.reports if text.startswith("another simulator publishes")]
+
+
+def test_players_of_another_match_are_not_waited_for() -> None:
+    stage = Stage()
+    other = codec(messages.AGENT_STATUS).decode(status(0))
+    ready = {**other, "match_id": stage.match.match_id + 1}
+    stage.match.take_status(0, codec(messages.AGENT_STATUS).encode(ready), b"")
+    assert "keeper_1" in stage.match.roster.absent
+    stage.match.take_status(
+        0, codec(messages.AGENT_STATUS).encode({**ready, "match_id": stage.match.match_id}), b""
+    )
+    assert "keeper_1" not in stage.match.roster.absent
+
+
+def test_every_message_says_whose_match_and_which_moment_it_is_about() -> None:
+    stage = Stage(episodes=1, match_id=77)
+    stage.match.announce()
+    stage.arrive()
+    stage.play()
+    types = {
+        "match": messages.MATCH,
+        "episode": messages.EPISODE,
+        "field_state": messages.FIELD_STATE,
+    }
+    seen = {topic: (data, time) for topic, data, time in stage.published}
+    for topic, (data, time) in seen.items():
+        if topic.endswith("/perception") or topic in types:
+            message = codec(types.get(topic, messages.PERCEPTION)).decode(data)
+            assert message["match_id"] == 77
+            if topic != "match":
+                assert message["header"] == messages.header(time)
+                assert messages.read_match_id(data) == 77

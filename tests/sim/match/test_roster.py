@@ -17,8 +17,8 @@ TIMEOUT = 2.0  # [s]
 KEEPER, MATE, TAKER = 0, 1, 3
 
 
-def answer(player, episode=0, cycle=0, action=Action.GO_TO_BALL, target=0, values=()):
-    return action_request(Request(player, episode, cycle, action, target), values)
+def answer(player, episode=0, cycle=0, action=Action.GO_TO_BALL, target=0, values=(), match_id=0):
+    return action_request(Request(player, episode, cycle, action, target, match_id), values)
 
 
 @pytest.fixture
@@ -147,11 +147,12 @@ def test_the_end_of_an_episode_needs_no_answer(world, roster):
         (b"", "no ActionRequest"),
         (b"\0\1\0\0" + b"\0" * 10, "no ActionRequest"),
         (b"\0\0" + answer(KEEPER)[2:], "no ActionRequest"),
-        (answer(KEEPER) + b"\0" * 4, "ActionRequest of 28 bytes"),
-        (answer(KEEPER, values=[1.0])[:-1], "ActionRequest of 35 bytes"),
+        (answer(KEEPER) + b"\0" * 4, "ActionRequest of 40 bytes"),
+        (answer(KEEPER, values=[1.0])[:-1], "ActionRequest of 43 bytes"),
         (answer(KEEPER, values=[1.0] * 65), "65 action values"),
         (answer(KEEPER, values=[math.nan]), "not finite"),
         (answer(KEEPER, values=[1.0, math.inf]), "not finite"),
+        (answer(KEEPER, match_id=9), "match 9, which is another one"),
         (answer(MATE), "in the name of player 1"),
         (answer(KEEPER, cycle=1), "yet to come"),
         (answer(KEEPER, episode=1), "yet to come"),
@@ -169,6 +170,13 @@ def test_what_no_player_may_send_is_counted_and_moves_nobody(roster, data, why):
     assert roster.seats[KEEPER].rejected == 1
     assert roster.num_awaited == 5
     assert roster.requests()[0][0, KEEPER] == Action.GET_OPEN
+
+
+@pytest.mark.parametrize("values", [(), (0.5, 1.5)])
+def test_answers_of_agents_from_before_matches_had_numbers_count(roster, values):
+    whole = answer(KEEPER, values=values)
+    roster.take(KEEPER, whole[: 28 + 8 * len(values)] if values else whole[:24])
+    assert roster.num_awaited == 4
 
 
 def test_a_seat_is_its_holders_until_that_is_missing(world, roster):

@@ -20,10 +20,13 @@ from visualization_msgs.msg import MarkerArray
 
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Episode, FieldState, Match
 from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.nodes.scoreboard import Scoreboard
+from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.ros import publishing
 from keepaway_sim.ros.inbox import Inbox
-from keepaway_sim.ros.publishing import LATCHED, QUEUE
+from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE
 from keepaway_sim.task import Outcome
 
 SLOW_ENOUGH = 20.0  # [s] no answer is ever late
@@ -182,7 +185,6 @@ def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
     known = graph.node.get_publishers_info_by_topic("told")[0].endpoint_gid
     assert {gid for _, gid in heard} == {bytes(known)}
     assert [deserialize_message(data, Episode).number for data, _ in heard] == numbers
-    graph.node.remove_waitable(inbox)
     inbox.destroy()
 
 
@@ -294,3 +296,49 @@ def test_it_writes_its_own_bag(graph: Graph, tmp_path: Path) -> None:
     )
     assert counts["/taker_2/action_request"] == cycles
     assert counts["/keeper_3/status"] == 2
+
+
+def test_another_simulator_is_refused_and_with_force_disturbs_nobody(
+    graph: Graph,
+) -> None:
+    simulator = graph.start_simulator(episodes=4, seed=3, answer_timeout=SLOW_ENOUGH)
+    board = graph.add(Scoreboard(4, simulator.conductor.match_id, context=graph.context))
+    graph.start_players(policy="random")
+    graph.play(until=lambda: simulator.conductor.num_cycles >= 3)
+
+    def another(**parameters: object) -> Simulator:
+        arguments = ros_arguments({"seed": 9, **parameters}, "simulator")
+        return Simulator(context=graph.context, cli_args=arguments, use_global_arguments=False)
+
+    refused = graph.add(another())
+    with pytest.raises(KeepawayError, match="another simulator publishes `match` here"):
+        refused.play(graph.spin)
+    forced = graph.add(another(force=True))
+    stray = graph.node.create_publisher(Episode, "episode", ALL)
+    for number in range(10):
+        stray.publish(Episode(number=number, duration=99.0))
+    expected = played(trained(4, seed=3, policy="random"))
+    graph.play()
+    graph.spin_until(lambda: board.next_episode >= 4 and board.num_ignored >= 10)
+    own = board.summary()
+    assert list(zip(own["episode_cycles"], own["episode_outcomes"], strict=True)) == expected
+    assert forced.conductor.num_cycles == 0
+    assert {player.agent.episodes for player in graph.players.values() if player.agent} == {4}
+
+
+def test_a_player_joins_the_other_match_once_its_own_simulator_is_gone(
+    graph: Graph, ros_domain: int
+) -> None:
+    first = Graph(ros_domain)
+    first.start_simulator(seed=1)
+    keeper = graph.start_player("keeper_1")
+    graph.spin_until(lambda: keeper.agent is not None)
+    second = graph.start_simulator(seed=9, force=True)
+    graph.spin_until(lambda: graph.node.count_publishers("match") == 2)
+    graph.spin_until(lambda: keeper.count_publishers("match") == 2)
+    assert keeper.agent is not None
+    assert keeper.agent.facts.seed == 1
+    assert "keeper_1" in second.conductor.roster.absent
+    first.close()
+    graph.spin_until(lambda: keeper.agent is not None and keeper.agent.facts.seed == 9)
+    graph.spin_until(lambda: "keeper_1" not in second.conductor.roster.absent)

@@ -61,6 +61,7 @@ def test_a_request_is_laid_out_as_worked_out_by_hand() -> None:
         b"\x01\x01" b"\0\0"  # action, target, padding to 4
         b"\x01\0\0\0" b"\0\0\0\0"  # one value, padding to 8 (counted from after the header)
         b"\x00\x00\x00\x00\x00\x00\xe0\x3f"  # 0.5
+        b"\0\0\0\0\0\0\0\0"  # no match_id
     )  # fmt: skip
     assert data == by_hand
 
@@ -115,19 +116,23 @@ def test_definitions_are_understood_by_rosbags_and_have_its_hash(name: str) -> N
 
 def test_many_messages_are_written_and_read_at_once() -> None:
     lengths = {"positions": 4, "velocities": 4, "ages": 2, "cycles_to_ball": 1}
+    lengths["header.frame_id"] = len(b"field\0")
     messages = PERCEPTION.empty(2, lengths)
     messages["player_index"] = [0, 1]
+    messages["header.frame_id"] = b"field"
     messages["positions"] = [[1, 2, 3, 4], [5, 6, 7, 8]]
     one_by_one = [PERCEPTION.decode(row.tobytes()) for row in messages]
     assert [entry["player_index"] for entry in one_by_one] == [0, 1]
     assert one_by_one[1]["positions"] == [5, 6, 7, 8]
+    assert one_by_one[1]["header"]["frame_id"] == "field"
     assert PERCEPTION.encode(one_by_one[1]) == messages[1].tobytes()
     assert PERCEPTION.lengths(one_by_one[0]) == lengths
 
 
 def test_messages_are_whole_words_as_they_arrive_over_dds() -> None:
     lengths = {"positions": 12, "velocities": 12, "ages": 6, "cycles_to_ball": 5}
-    assert len(PERCEPTION.empty(1, lengths)[0].tobytes()) == 284
+    lengths["header.frame_id"] = len(b"field\0")
+    assert len(PERCEPTION.empty(1, lengths)[0].tobytes()) == 312
     assert len(PERCEPTION.encode({"cycles_to_ball": [1]})) % 4 == 0
 
 
@@ -160,7 +165,7 @@ def test_bytes_that_are_no_message_are_refused(data: bytes) -> None:
         REQUEST.decode(data)
 
 
-def test_strings_have_no_fixed_place() -> None:
+def test_strings_of_unknown_lengths_have_no_fixed_place() -> None:
     with pytest.raises(KeepawayError, match=r"AgentStatus\.name has no fixed place"):
         codec("keepaway_msgs/msg/AgentStatus").dtype({})
 

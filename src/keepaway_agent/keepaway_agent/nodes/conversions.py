@@ -21,6 +21,9 @@ from keepaway_msgs.msg import Match
 HEADER = b"\x00\x01\x00\x00"
 """CDR, little-endian; fields are aligned to their sizes, counted from its end."""
 _OUTCOMES = frozenset(Outcome)
+_MATCH_ID = struct.Struct("<Q")
+_STAMP_AND_LENGTH = 12  # [bytes] of a header, before its frame's name
+_COUNT = struct.Struct("<I")
 _MOST_PADDING = 3
 """Bytes that may follow a message's last field."""
 
@@ -45,21 +48,24 @@ def match_facts(message: Match) -> MatchFacts:
     )
 
 
-def read_perception(data: bytes, num_players: int, index: int) -> Perceived:
+def read_perception(data: bytes, num_players: int, index: int, own_match_id: int = 0) -> Perceived:
     """A Perception's bytes, checked to be one that this player can have.
 
     Raises:
-        AgentError: of another player or number of players, not finite, or not a Perception.
+        AgentError: of another match, player or number of players, not finite, or no Perception.
     """
     layout, objects = _perception_layout(num_players), num_players + 1
-    if not layout.size <= len(data) <= layout.size + _MOST_PADDING:
-        raise AgentError(f"{len(data)} bytes: a perception of {num_players} has {layout.size}")
+    size = _size_with_header(data, layout.size)
+    if not size <= len(data) <= size + _MOST_PADDING:
+        raise AgentError(f"{len(data)} bytes: a perception of {num_players} has {size}")
     (
-        header, _, _, player, episode, cycle, outcome, is_due, is_kickable, _, _, *arrays
+        header, _, _, player, episode, cycle, outcome, is_due, is_kickable, _, _, *arrays, match_id
     ) = layout.unpack_from(data)  # fmt: skip
     counts = arrays[0], arrays[2 * objects + 1], arrays[4 * objects + 2], arrays[-num_players - 1]
     if header != HEADER or counts != (2 * objects, 2 * objects, objects, num_players):
         raise AgentError(f"not the perception of one of {num_players} players")
+    if match_id not in (0, own_match_id):
+        raise AgentError(f"a perception of match {match_id}, which is another one")
     if player != index or outcome not in _OUTCOMES:
         raise AgentError(f"a perception of player {player} with outcome {outcome}")
     positions = arrays[1 : 2 * objects + 1]
@@ -76,7 +82,7 @@ def read_perception(data: bytes, num_players: int, index: int) -> Perceived:
     return Perceived(episode, outcome, is_due, view)
 
 
-def write_request(index: int, perceived: Perceived, decision: Decision) -> bytes:
+def write_request(index: int, perceived: Perceived, decision: Decision, match_id: int = 0) -> bytes:
     """The ActionRequest with which a player answers what it perceived, as bytes."""
     values = decision.values.tolist()
     return _request_layout(len(values)).pack(
@@ -88,6 +94,7 @@ def write_request(index: int, perceived: Perceived, decision: Decision) -> bytes
         decision.target,
         len(values),
         *values,
+        match_id,
     )
 
 
@@ -99,10 +106,17 @@ def _perception_layout(num_players: int) -> struct.Struct:
     vectors = f"I4x {2 * objects}d"
     padding = "2x" if objects % 2 else ""
     counts = f"I {objects}H {padding} I {num_players}H"
-    return struct.Struct(f"< {moment} {angles} {vectors} {vectors} {counts}")
+    text = f"< {moment} {angles} {vectors} {vectors} {counts}"
+    unaligned = (struct.calcsize(text) - len(HEADER)) % _MATCH_ID.size
+    return struct.Struct(f"{text} {-unaligned % _MATCH_ID.size}x Q")
+
+
+def _size_with_header(data: bytes, size: int) -> int:
+    """The bytes of a message that ends with a std_msgs/Header after so many."""
+    end = size + _STAMP_AND_LENGTH
+    return end + (_COUNT.unpack_from(data, end - _COUNT.size)[0] if len(data) >= end else 0)
 
 
 @functools.cache
 def _request_layout(num_values: int) -> struct.Struct:
-    values = f"4x {num_values}d" if num_values else ""
-    return struct.Struct(f"< 4s B3x II BB2x I {values}")
+    return struct.Struct(f"< 4s B3x II BB2x I 4x {num_values}d Q")

@@ -32,6 +32,8 @@ QUEUE = QoSProfile(depth=10)
 ANSWERS = QoSProfile(depth=200)
 """Deeper than the simulator needs: a recorder may be some cycles behind."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MATCHES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""With a depth of 1 another simulator's `match` would replace the own one's."""
 ANNOUNCEMENT_PERIOD = (
     0.5  # [s] a first message may be lost although the nodes have found each other
 )
@@ -60,6 +62,7 @@ class Player(Node):
         super().__init__(f"{role.name.lower()}_1", **node_options)
         self.agent: Agent | None = None
         self._role = role
+        self._match_id, self._other_match = 0, Match()
         self._config = declare_settings(self, AgentConfig)
         check_config(role, self._config)
         files = declare_settings(self, WeightsFiles)
@@ -69,7 +72,7 @@ class Player(Node):
         name = self.get_name()
         self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", ANSWERS)
         self._status = self.create_publisher(AgentStatus, f"{name}/status", LATCHED)
-        self.create_subscription(Match, "match", self._on_match, LATCHED)
+        self.create_subscription(Match, "match", self._on_match, MATCHES)
         self.create_subscription(
             Perception, f"{name}/perception", self._on_perception, QUEUE, raw=True
         )
@@ -77,6 +80,8 @@ class Player(Node):
         self.create_service(LoadWeights, f"{name}/load_weights", self._on_load)
         self._is_announcing = True
         self._announcement = self.create_timer(ANNOUNCEMENT_PERIOD, self._announce)
+        self._reconsidering = self.create_timer(ANNOUNCEMENT_PERIOD, self._reconsider)
+        self._reconsidering.cancel()  # until there is another match
 
     def save(self) -> None:
         """Write what it has learned, where the parameter `save_weights` says so.
@@ -104,7 +109,26 @@ class Player(Node):
         return load_weights(own)
 
     def _on_match(self, match: Match) -> None:
-        """Take the own place in a new match, with what was learned before."""
+        """Join a new match, but no other one while the own one's simulator is there."""
+        is_another = self._match_id not in (0, match.match_id)
+        if is_another and self.count_publishers("match") > 1:
+            self._other_match = match
+            self._reconsidering.reset()
+            self.get_logger().warning(
+                f"another simulator publishes `match` here ({match.task}, number"
+                f" {match.match_id}): ignored while that of match {self._match_id} is there"
+            )
+        else:
+            self._join(match)
+
+    def _reconsider(self) -> None:
+        """Join the other match once only its simulator is left."""
+        if self.count_publishers("match") < 2:
+            self._reconsidering.cancel()
+            self._join(self._other_match)
+
+    def _join(self, match: Match) -> None:
+        """Take the own place in a match, with what was learned before."""
         name = self.get_name()
         if name not in match.player_names:
             self.get_logger().error(
@@ -120,7 +144,7 @@ class Player(Node):
             agent.use(known)
         elif self._config.policy == "greedy":
             self.get_logger().warning("greedy without load_weights: it will choose at random")
-        self.agent = agent
+        self.agent, self._match_id = agent, match.match_id
         self.get_logger().info(
             f"plays {match.task} as {self._config.policy}, seed {match.seed}, from episode"
             f" {match.first_episode} on"
@@ -139,6 +163,7 @@ class Player(Node):
                 episodes=agent.episodes if agent else 0,
                 simulated_hours=agent.hours if agent else 0.0,
                 code_version=version("keepaway_agent"),
+                match_id=self._match_id,
             )
         )
 
@@ -147,7 +172,9 @@ class Player(Node):
         if agent is None:
             return
         try:
-            perceived = conversions.read_perception(data, agent.facts.num_players, agent.index)
+            perceived = conversions.read_perception(
+                data, agent.facts.num_players, agent.index, self._match_id
+            )
         except AgentError as error:
             episode, cycle = agent.moment
             self.get_logger().warning(
@@ -158,7 +185,9 @@ class Player(Node):
         num_ended = agent.episodes + agent.cut_off
         decision = agent.perceive(perceived)
         if decision:
-            self._requests.publish(conversions.write_request(agent.index, perceived, decision))
+            self._requests.publish(
+                conversions.write_request(agent.index, perceived, decision, self._match_id)
+            )
         if agent.episodes + agent.cut_off > num_ended:
             self._after_episode(agent, perceived)
         if self._is_announcing:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import secrets
+
 import numpy as np
 
 from keepaway_sim.world.world import World
 
 WORLD_KEY = (0, 0)
 """The spawn key of the world's seed in a match of nodes: trial 0; second, 1 is the players'."""
+
+
+def random_match_id() -> int:
+    """A number that no other match has: 1 .. 2^63 - 1, as a ROS parameter can be."""
+    return secrets.randbelow(2**63 - 1) + 1
 
 
 def begin_match(world: World, seed: int, first_episode: int = 0) -> None:

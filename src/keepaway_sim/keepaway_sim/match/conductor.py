@@ -13,12 +13,13 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.match.beginning import begin_match
+from keepaway_sim.match.beginning import begin_match, random_match_id
 from keepaway_sim.match.recorders import RecorderProgress
 from keepaway_sim.match.roster import Roster, checked_status
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Outcome
 from keepaway_sim.wire import messages
+from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.field_messages import FieldMessages
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_sim.world.world import World
@@ -26,6 +27,7 @@ from keepaway_sim.world.world import World
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
 LOG_PERIOD = 5.0  # [s] the same warning is not given more often
+ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another one refuses to play
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 
 Spin = Callable[[float], None]
@@ -75,6 +77,7 @@ class Conductor:
 
     Attributes:
         world, settings: what is played; settings may be replaced while the match is running.
+        match_id: what tells its messages from those of every other match.
         roster: who plays.
         recorders: how far those that record it have come.
         is_running: false while it pauses.
@@ -104,7 +107,8 @@ class Conductor:
         """
         self.world, self.settings = world, settings
         begin_match(world, settings.seed, settings.first_episode)
-        self.roster = Roster(world.task, world.config)
+        self.match_id = settings.match_id or random_match_id()
+        self.roster = Roster(world.task, world.config, self.match_id)
         self.recorders = RecorderProgress(settings.wait_for_recorder)
         self.is_running = settings.autostart
         self.num_finished, self.num_cycles, self.time_played = settings.first_episode, 0, 0.0
@@ -112,8 +116,9 @@ class Conductor:
         self.on_begin: Callable[[], None] = lambda: None
         self.on_end: Callable[[], None] = lambda: None
         self._outlet, self._log, self._clock = outlet, log, clock
-        self._messages = FieldMessages(world)
+        self._messages = FieldMessages(world, match_id=self.match_id)
         self._is_reset = self._has_begun = False
+        self._arrived_at, self._refusal = clock(), ""
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
@@ -131,7 +136,11 @@ class Conductor:
         self._outlet.publish("match", self._messages.match(*played), 0)
 
     def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
-        """Play until all episodes have ended, or `is_told_to_end` says so."""
+        """Play until all episodes have ended, or `is_told_to_end` says so.
+
+        Raises:
+            KeepawayError: another simulator was there before.
+        """
         self._is_told_to_end, self._spin = is_told_to_end, spin
         while not self._is_over():
             if not self._can_play():
@@ -144,6 +153,8 @@ class Conductor:
                 self._collect()
                 self._step()
             self.time_played += self._clock() - began
+        if self._refusal:
+            raise KeepawayError(self._refusal)
 
     def take_leave(self) -> None:
         """After `play`: give everybody time to take in what was published last."""
@@ -171,7 +182,7 @@ class Conductor:
         was_there = seat.present or seat.returning
         try:
             status = checked_status(data, player, seat.name)
-            if not status["ready"]:
+            if not status["ready"] or status["match_id"] not in (0, self.match_id):
                 return
             self.roster.welcome(player, sender)
         except KeepawayError as error:
@@ -181,6 +192,22 @@ class Conductor:
         self._statuses[player] = {**status, "data": data}
         if not was_there:
             self._log.info(f"{seat.name} is ready: {status['policy']}")
+
+    def take_match(self, data: bytes, sender: bytes) -> None:
+        """Take a Match's bytes: an own one, or that of another simulator on the same topics."""
+        try:
+            other = codec(messages.MATCH).decode(data)
+        except KeepawayError as error:
+            self._warn("match", f"match: ignored: {error}")
+            return
+        if other["match_id"] == self.match_id:
+            return
+        found = f"another simulator publishes `match` here ({other['task']})"
+        has_just_come = self._clock() - self._arrived_at < ARRIVAL and not self._has_begun
+        if has_just_come and not self.settings.force:
+            self._refusal = f"{found}: choose another namespace or domain, or force:=true"
+        else:
+            self._warn("match", f"{found}: players and scoreboards tell them apart by match_id")
 
     def take_recorded(self, data: bytes, sender: bytes) -> None:
         """Take the bytes of the time that a recorder has reached."""
@@ -223,7 +250,7 @@ class Conductor:
     # Whether to play.
 
     def _is_over(self) -> bool:
-        return self._is_played() or self._is_told_to_end()
+        return self._is_played() or self._is_told_to_end() or bool(self._refusal)
 
     def _is_played(self) -> bool:
         """Have all episodes ended?"""

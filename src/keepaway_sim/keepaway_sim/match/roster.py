@@ -58,11 +58,11 @@ class Roster:
         num_awaited: answers that are due from present players and not in yet.
     """
 
-    def __init__(self, task: Task, config: Config) -> None:
-        """Everybody is absent."""
+    def __init__(self, task: Task, config: Config, match_id: int = 0) -> None:
+        """Everybody is absent; messages of players of another match are rejected."""
         self.seats = [Seat(name) for name in task.player_names]
         self.num_awaited = 0
-        self._task = task
+        self._task, self._match_id = task, match_id
         self._legal = _legal_requests(task, config)
         self._episode = self._cycle = -1
         self._due = [False] * task.num_players
@@ -194,6 +194,8 @@ class Roster:
 
     def _checked(self, player: int, data: bytes) -> Request:
         request = checked_request(data)
+        if request.match_id not in (0, self._match_id):
+            raise KeepawayError(f"a request in match {request.match_id}, which is another one")
         if request.player_index != player:
             raise KeepawayError(f"a request in the name of player {request.player_index}")
         if (request.episode, request.cycle) > (self._episode, self._cycle):
@@ -234,8 +236,11 @@ def checked_request(data: bytes) -> Request:
     if len(data) < 24 or data[:2] != b"\x00\x01":
         raise KeepawayError(f"{len(data)} bytes that are no ActionRequest")
     count = _COUNT.unpack_from(data, 20)[0]
-    size = 28 + 8 * count if count else 24
-    if count > MAX_ACTION_VALUES or not size <= len(data) < size + 4:
+    whole = 36 + 8 * count
+    of_before = 28 + 8 * count if count else 24  # matches had no numbers, but agents live long
+    if count > MAX_ACTION_VALUES or not (
+        whole <= len(data) < whole + 4 or of_before <= len(data) < of_before + 4
+    ):
         raise KeepawayError(f"an ActionRequest of {len(data)} bytes with {count} action values")
     if count and not all(map(math.isfinite, struct.unpack_from(f"<{count}d", data, 28))):
         raise KeepawayError("action values that are not finite")

@@ -33,6 +33,9 @@ class MatchSettings:
     first_episode: int = setting(
         0, "its number, to continue a match whose simulator died", "", "[0, 1000000000]"
     )
+    match_id: int = setting(
+        0, "tells this match from every other one; 0: drawn at random", "", f"[0, {MOST}]"
+    )
     answer_timeout: float = setting(
         2.0, "wall time after which a player who has not answered is unresponsive", "s", "(0, 3600]"
     )
@@ -43,6 +46,7 @@ class MatchSettings:
     wait_for_recorder: bool = setting(
         False, "begin with the recorders' nodes, and play no faster than they follow"
     )
+    force: bool = setting(False, "start although another simulator publishes its match here")
 
 
 CHANGEABLE = ("speed", "answer_timeout")

@@ -10,13 +10,14 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from tqdm import tqdm
 
-from keepaway_msgs.msg import Episode
+from keepaway_msgs.msg import Episode, Match
 from keepaway_sim.match.scores import Score, summary
-from keepaway_sim.ros.publishing import ALL, QUEUE
+from keepaway_sim.ros.publishing import ALL, MATCHES, QUEUE
 from keepaway_sim.task import Outcome
 
 TERMINAL_PERIOD, FILE_PERIOD = 0.5, 10.0
 """[s] between two reports."""
+LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 RECENT = 20
 """Episodes of the mean that is shown."""
 
@@ -27,18 +28,34 @@ def score(episode: Episode) -> Score:
 
 
 class Scoreboard(Node):
-    """Listens to `episode` and `diagnostics` of one match.
+    """Subscribes to `episode` and `diagnostics` of one match; those of others do not count.
 
     Attributes:
+        match_id: of the match whose episodes count; 0 until one is known.
+        num_ignored: messages of other matches.
         episodes: that have ended, by number.
         state: of the match, in the simulator's words.
         figures: the simulator's, by name.
         troubles: by player, how many answers were late, missed and rejected.
     """
 
-    def __init__(self, num_wanted: int = 0, out: TextIO = sys.stderr, **node_options: Any) -> None:
-        """Nothing heard yet; `num_wanted` is how many episodes are to be played, 0 if unknown."""
+    def __init__(
+        self,
+        num_wanted: int = 0,
+        match_id: int = 0,
+        out: TextIO = sys.stderr,
+        **node_options: Any,
+    ) -> None:
+        """Count nothing yet.
+
+        Args:
+            num_wanted: episodes that are to be played; 0 if unknown.
+            match_id: of the match; 0: of the first one that is published here.
+            out: where to report.
+            node_options: for `rclpy.node.Node`.
+        """
         super().__init__("scoreboard", **node_options)
+        self.match_id, self.num_ignored = match_id, 0
         self.episodes: dict[int, Episode] = {}
         self.state = "no simulator was heard"
         self.figures: dict[str, str] = {}
@@ -46,6 +63,7 @@ class Scoreboard(Node):
         self._num_wanted, self._out = num_wanted, out
         self._show_at = 0.0
         self._bar: tqdm[Any] | None = None
+        self.create_subscription(Match, "match", self._on_match, MATCHES)
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_health, QUEUE)
 
@@ -106,13 +124,29 @@ class Scoreboard(Node):
         pace = f"{rate} cycles/s, " if rate != "0" else ""  # at first it is not known yet
         return f"{held}{pace}{self.state}"
 
+    def _on_match(self, message: Match) -> None:
+        self._is_own(message.match_id, f"a simulator of {message.task} publishes `match`")
+
     def _on_episode(self, message: Episode) -> None:
-        self.episodes[message.number] = message
+        if self._is_own(message.match_id, "`episode` is published"):
+            self.episodes.setdefault(message.number, message)
+
+    def _is_own(self, match_id: int, what: str) -> bool:
+        """Whether a message is of the own match; if not, warn now and then."""
+        self.match_id = self.match_id or match_id
+        if match_id == self.match_id:
+            return True
+        self.num_ignored += 1
+        self.get_logger().warning(
+            f"{what} in match {match_id}, too: not counted, this is match {self.match_id}",
+            throttle_duration_sec=LOG_PERIOD,
+        )
+        return False
 
     def _on_health(self, message: DiagnosticArray) -> None:
         prefix = self.get_namespace().rstrip("/") + "/"
         for status in message.status:
-            if not status.name.startswith(prefix):
+            if not status.name.startswith(prefix) or status.hardware_id != str(self.match_id):
                 continue
             values = {entry.key: entry.value for entry in status.values}
             name = status.name.removeprefix(prefix)

@@ -26,22 +26,25 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from keepaway_msgs.msg import ActionRequest, AgentStatus
+from keepaway_msgs.msg import ActionRequest, AgentStatus, Match
 from keepaway_sim.bags.field_recorder import world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
-from keepaway_sim.ros.diagnostics import diagnostics
+from keepaway_sim.ros.diagnostics import diagnostics, player_statuses, simulator_status
 from keepaway_sim.ros.inbox import PROCESS_SIZE, Inbox
 from keepaway_sim.ros.parameters import declare_settings
-from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE, MatchPublisher
+from keepaway_sim.ros.publishing import ALL, LATCHED, MATCHES, QUEUE, MatchPublisher
 from keepaway_sim.settings import same
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config, Physics, Skills, Vision, profile
 from keepaway_sim.world.world import World
 
 HEALTH_PERIOD = 1.0  # [s]
+LOG_PERIOD = 5.0  # [s] the same warning is not given more often
+OWN_TOPICS = ("match", "episode", "field_state", "/clock")
+"""No other node publishes these in a match."""
 LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 
 
@@ -136,7 +139,10 @@ class Simulator(Node):
                 ("status", AgentStatus, self._on_status, LATCHED),
             )
         ]
-        self._inboxes.append(Inbox(self, Time, "recorded", self.conductor.take_recorded, ALL))
+        self._inboxes += [
+            Inbox(self, Match, "match", self.conductor.take_match, MATCHES),
+            Inbox(self, Time, "recorded", self.conductor.take_recorded, ALL),
+        ]
 
     def _offer(self) -> None:
         """Services and diagnostics."""
@@ -173,10 +179,27 @@ class Simulator(Node):
         prefix = self.get_namespace().rstrip("/") + "/"
         stamp = self.get_clock().now().to_msg()
         seats = conductor.roster.seats
+        strays = self._topics_of_others()
         answering = [self.count_publishers(f"{seat.name}/action_request") for seat in seats]
         self._diagnostics.publish(
-            diagnostics(prefix, stamp, conductor.state(), figures, seats, answering)
+            diagnostics(
+                simulator_status(prefix, conductor.state(), figures, strays),
+                player_statuses(prefix, seats, answering),
+                conductor.match_id,
+                stamp,
+            )
         )
+
+    def _topics_of_others(self) -> list[str]:
+        """Of the topics that only a simulator publishes, those that another node publishes too."""
+        strays = [topic for topic in OWN_TOPICS if self.count_publishers(topic) > 1]
+        if strays:
+            self.get_logger().warning(
+                f"another node publishes {', '.join(strays)}: choose another namespace or domain"
+                " for it",
+                throttle_duration_sec=LOG_PERIOD,
+            )
+        return strays
 
 
 def _on_trigger(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -9,35 +11,43 @@ from keepaway_sim.match.roster import Seat
 
 
 def diagnostics(
-    namespace: str,
-    stamp: Time,
-    state: str,
-    figures: dict[str, str],
-    seats: list[Seat],
-    num_answering: list[int],
+    simulator: DiagnosticStatus, players: Iterable[DiagnosticStatus], match_id: int, stamp: Time
 ) -> DiagnosticArray:
-    """One status for the simulator, and one for every player.
+    """All statuses of a match; `match_id` is their hardware_id, `stamp` the wall's time."""
+    array = DiagnosticArray(status=[simulator, *players])
+    for status in array.status:
+        status.hardware_id = str(match_id)
+    array.header.stamp = stamp
+    return array
+
+
+def simulator_status(
+    namespace: str, state: str, figures: dict[str, str], strays: list[str]
+) -> DiagnosticStatus:
+    """The simulator's own.
 
     Args:
         namespace: of the match.
-        stamp: wall time.
         state: of the match, in words.
         figures: of the match, by name.
-        seats: the players.
-        num_answering: how many nodes answer for each.
+        strays: topics of its own that another node publishes, too.
     """
-    simulator = DiagnosticStatus(
-        level=DiagnosticStatus.OK,
+    return DiagnosticStatus(
+        level=DiagnosticStatus.WARN if strays else DiagnosticStatus.OK,
         name=f"{namespace}simulator",
         message=state,
-        values=[KeyValue(key=key, value=value) for key, value in figures.items()],
+        values=[
+            *(KeyValue(key=key, value=value) for key, value in figures.items()),
+            KeyValue(key="published_by_others", value=" ".join(strays)),
+        ],
     )
-    players = (
-        _of_player(namespace, seat, num) for seat, num in zip(seats, num_answering, strict=True)
-    )
-    array = DiagnosticArray(status=[simulator, *players])
-    array.header.stamp = stamp
-    return array
+
+
+def player_statuses(
+    namespace: str, seats: Sequence[Seat], num_answering: Sequence[int]
+) -> list[DiagnosticStatus]:
+    """One for every player; `num_answering` nodes answer for each."""
+    return [_of_player(namespace, *each) for each in zip(seats, num_answering, strict=True)]
 
 
 def _of_player(namespace: str, seat: Seat, num_answering: int) -> DiagnosticStatus:

@@ -91,7 +91,7 @@ class Inbox(Waitable):
             self._subscription = _rclpy.Subscription(
                 node.handle, message_class, name, qos.get_c_qos_profile()
             )
-        self._hear = hear
+        self._hear, self._is_open, self._node = hear, True, node
         self._place = 0  # in the wait set
         self._bytes = _Bytes(allocator=_RCUTILS.rcutils_get_default_allocator())
         self._info = _MessageInfo()
@@ -123,7 +123,7 @@ class Inbox(Waitable):
 
         It would make a task of every message, which takes longer than taking it.
         """
-        if wait_set.is_ready("subscription", self._place):
+        if self._is_open and wait_set.is_ready("subscription", self._place):
             taken = self._take()
             if taken is not None:  # the executor may have been told of it in vain
                 self._hear(*taken)
@@ -146,6 +146,8 @@ class Inbox(Waitable):
         """Never called, as it is never ready."""
 
     def destroy(self) -> None:
-        """Listen no longer."""
+        """Listen no longer, whatever an executor still has in hand."""
+        self._is_open = False
+        self._node.remove_waitable(self)
         self._subscription.destroy_when_not_in_use()
         _RCUTILS.rcutils_uint8_array_fini(self._bytes)

@@ -19,6 +19,8 @@ from keepaway_sim.wire import messages
 QUEUE = QoSProfile(depth=200)
 """Deeper than a player needs: a recorder may be some cycles behind."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MATCHES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For subscribers of `match`: with a depth of 1 another simulator's would replace the own one's."""
 ALL = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Whoever counts episodes may come late."""
 TOPICS = {

@@ -101,15 +101,15 @@ class Codec:
     def dtype(self, lengths: Mapping[str, int], size: int = 0) -> np.dtype[np.void]:
         """All messages whose sequences have these lengths, as one structured type.
 
-        A field `stamp` with parts is named `stamp.sec`, `stamp.nanosec`; a sequence `ages` comes
-        with `ages.length`. Bytes between the fields are padding.
+        A field `stamp` with parts is named `stamp.sec`, `stamp.nanosec`; a sequence or string
+        `ages` comes with `ages.length`. Bytes between the fields are padding.
 
         Args:
-            lengths: of the message's sequences.
+            lengths: of the message's sequences and strings.
             size: bytes of a message, if they may be padded otherwise than `encode` does.
 
         Raises:
-            KeepawayError: the message has strings or sequences of messages.
+            KeepawayError: the message has strings of unknown lengths, or sequences of messages.
         """
         try:
             return self._laid_out(self._leaves(self._root, "", lengths), size)
@@ -129,12 +129,11 @@ class Codec:
             raise KeepawayError(f"{self.message_type} has no layout: {error}") from error
 
     def lengths(self, values: Mapping[str, Any]) -> dict[str, int]:
-        """The lengths of a decoded message's sequences, for `dtype`."""
-        return {
-            field.name: len(values[field.name])
-            for field in self._root
-            if field.is_array and field.size is None
-        }
+        """The lengths of a decoded message's sequences and strings, for `dtype`.
+
+        A string's is that of its bytes with the one that ends it.
+        """
+        return dict(self._lengths(self._root, "", values))
 
     def empty(self, count: int, lengths: Mapping[str, int]) -> np.ndarray:
         """(count,) messages of `dtype(lengths)` with every value 0: to fill, then `rows`."""
@@ -171,6 +170,18 @@ class Codec:
                 raise OverflowError(f"more than {_MOST_FIELDS} fields")
         size = size or _aligned(position, PAYLOAD)
         return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+
+    def _lengths(
+        self, fields: Sequence[Field], prefix: str, values: Mapping[str, Any]
+    ) -> Iterator[tuple[str, int]]:
+        for field in fields:
+            name, value = prefix + field.name, values[field.name]
+            if field.is_array and field.size is None:
+                yield name, len(value)
+            elif field.type == "string" and not field.is_array:
+                yield name, len(value.encode()) + 1
+            elif field.type not in _PRIMITIVES and not field.is_array:
+                yield from self._lengths(self._messages[field.type], f"{name}.", value)
 
     def _write(self, out: bytearray, fields: Sequence[Field], values: Mapping[str, Any]) -> None:
         unknown = values.keys() - {field.name for field in fields}
@@ -236,6 +247,9 @@ class Codec:
                     yield name, number, number.itemsize
                 elif size:
                     yield name, (number, (size,)), number.itemsize
+            elif field.type == "string" and not field.is_array and name in lengths:
+                yield f"{name}.length", "<u4", 4
+                yield name, f"S{lengths[name]}", 1
             elif field.type == "string" or field.is_array:
                 raise KeepawayError(f"{self.message_type}.{name} has no fixed place")
             else:
@@ -252,7 +266,7 @@ def codec(message_type: str, definition_text: str | None = None) -> Codec:
     >>> episode = codec("keepaway_msgs/msg/Episode")
     >>> data = episode.encode({"number": 7, "duration": 8.4})
     >>> len(data), episode.decode(data)["duration"]
-    (48, 8.4)
+    (76, 8.4)
     """
     return Codec(message_type, definition_text or definition(message_type))
 

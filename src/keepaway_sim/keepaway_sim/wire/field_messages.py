@@ -16,9 +16,11 @@ from keepaway_sim.wire.messages import (
     CYCLE_NS,
     EPISODE,
     FIELD_STATE,
+    FRAME,
     MARKERS,
     MATCH,
     PERCEPTION,
+    header,
     stamp,
 )
 from keepaway_sim.world.config import CYCLE_TIME
@@ -30,11 +32,18 @@ if TYPE_CHECKING:
 class FieldMessages:
     """What one field of a World says to players and viewers, as bytes of this very moment."""
 
-    def __init__(self, world: World, field: int = 0) -> None:
-        """Lay out the messages for the world's number of players."""
-        self._world, self._field = world, field
+    def __init__(self, world: World, field: int = 0, match_id: int = 0) -> None:
+        """Lay out the messages for the world's number of players.
+
+        Args:
+            world: that they are about.
+            field: its index in the world.
+            match_id: that all messages carry; 0: none.
+        """
+        self._world, self._field, self._match_id = world, field, match_id
         objects, num = world.task.num_players + 1, world.task.num_players
         places = {"positions": 2 * objects, "velocities": 2 * objects}
+        places["header.frame_id"] = len(FRAME) + 1
         self._perceptions = codec(PERCEPTION).empty(
             num, {**places, "ages": objects, "cycles_to_ball": num}
         )
@@ -43,6 +52,9 @@ class FieldMessages:
         self._state = codec(FIELD_STATE).empty(
             1, {**places, "yaws": num, "neck_yaws": num, "actions": num, "targets": num}
         )
+
+        for messages in (self._perceptions, self._state):
+            messages["match_id"], messages["header.frame_id"] = match_id, FRAME.encode()
 
     def stamp_ns(self) -> int:
         """Simulated time since the field was started [ns]."""
@@ -95,6 +107,8 @@ class FieldMessages:
                 "duration": cycles * CYCLE_TIME,
                 "outcome": int(seen.outcome[field]),
                 "lost_by": int(self._world.truth.last_keeper[field]),
+                "match_id": self._match_id,
+                "header": header(self.stamp_ns()),
             }
         )
 
@@ -117,6 +131,8 @@ class FieldMessages:
                 "code_version": code_version(),
                 "config_json": json.dumps(config.to_dict()),
                 "first_episode": first_episode,
+                "match_id": self._match_id,
+                "visible_angle_deg": config.vision.visible_angle_deg,
             }
         )
 
@@ -129,7 +145,8 @@ class FieldMessages:
 
     def _fill_moment(self, messages: np.ndarray) -> None:
         now, seen, field = stamp(self.stamp_ns()), self._world.belief, self._field
-        messages["stamp.sec"], messages["stamp.nanosec"] = now["sec"], now["nanosec"]
+        for name in ("stamp", "header.stamp"):
+            messages[f"{name}.sec"], messages[f"{name}.nanosec"] = now["sec"], now["nanosec"]
         messages["episode"] = seen.episode[field]
         messages["cycle"] = seen.cycle[field]
         messages["outcome"] = seen.outcome[field]
@@ -144,8 +161,9 @@ def marker_array(task: Task, position: np.ndarray, yaw: np.ndarray, time_ns: int
         yaw: (num_players,) body directions [rad].
         time_ns: simulated time [ns].
     """
-    header = {"stamp": stamp(time_ns), "frame_id": "field"}
-    markers = [{"header": header, **marker} for marker in field_markers(task, position, yaw)]
+    markers = [
+        {"header": header(time_ns), **marker} for marker in field_markers(task, position, yaw)
+    ]
     return codec(MARKERS).encode({"markers": markers})
 
 

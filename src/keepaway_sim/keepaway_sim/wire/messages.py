@@ -29,10 +29,16 @@ MARKERS = "visualization_msgs/msg/MarkerArray"
 
 SECOND = 1_000_000_000  # [ns]
 CYCLE_NS = round(CYCLE_TIME * SECOND)
+FRAME = "field"
+"""Of all positions: the field's centre, x forward, y left, z up."""
 _STAMP = struct.Struct("<iI")
 _STATE = struct.Struct("<4xiIIIB")  # CDR header, then stamp, episode, cycle, outcome
 _SEEN = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome, decision due
-_REQUEST = struct.Struct("<4xB3xIIBB")  # CDR header, then ActionRequest's fields but the values
+_REQUEST = struct.Struct("<4xB3xIIBB2xI")  # CDR header, then ActionRequest up to its values' count
+_REQUEST_HEAD = struct.Struct("<4xB3xII")  # CDR header, player, episode, cycle
+_MATCH_ID = struct.Struct("<Q")
+_VALUES_AT = 28  # [bytes] where an ActionRequest's values begin
+_TAIL = struct.Struct(f"<QiII{len(FRAME) + 1}s2x")  # match_id, then the header, at a message's end
 
 
 class Request(NamedTuple):
@@ -43,6 +49,7 @@ class Request(NamedTuple):
     cycle: int
     action: int
     target: int
+    match_id: int = 0  # 0: not said
 
 
 def read_request(data: bytes) -> Request:
@@ -51,7 +58,11 @@ def read_request(data: bytes) -> Request:
     Raises:
         struct.error: too few bytes.
     """
-    return Request(*_REQUEST.unpack_from(data))
+    *fields, count = _REQUEST.unpack_from(data)
+    end = _VALUES_AT + 8 * count
+    if len(data) < end + _MATCH_ID.size:  # of an agent built before matches had numbers
+        return Request(*fields)
+    return Request(*fields, *_MATCH_ID.unpack_from(data, end))
 
 
 class Saying(NamedTuple):
@@ -77,8 +88,16 @@ def read_saying(message_type: str, data: bytes) -> Saying:
     if message_type == PERCEPTION:
         sec, nanosec, player, episode, cycle, outcome, due = _SEEN.unpack_from(data)
         return Saying(episode, cycle, player, sec * SECOND + nanosec, outcome, due)
-    player, episode, cycle = _REQUEST.unpack_from(data)[:3]
+    player, episode, cycle = _REQUEST_HEAD.unpack_from(data)
     return Saying(episode, cycle, player)
+
+
+def read_match_id(data: bytes) -> int:
+    """The match that a Perception, FieldState or Episode belongs to; 0 where it does not say."""
+    if len(data) < _TAIL.size:
+        return 0
+    match_id, _, _, _, frame = _TAIL.unpack_from(data, len(data) - _TAIL.size)
+    return int(match_id) if frame == FRAME.encode() + b"\0" else 0
 
 
 def read_time(data: bytes) -> int:
@@ -101,7 +120,7 @@ def clean_request(data: bytes) -> bytes:
     clean[5:8] = bytes(3)  # after player_index
     clean[18:20] = bytes(2)  # after target
     if len(clean) > 24:
-        clean[24:28] = bytes(4)  # before the first of the action values
+        clean[24:28] = bytes(4)  # before the action values and the match's number
     return bytes(clean)
 
 
@@ -113,6 +132,11 @@ def action_request(request: Request, action_values: Sequence[float] = ()) -> byt
     True
     """
     return codec(ACTION_REQUEST).encode({**request._asdict(), "action_values": action_values})
+
+
+def header(time_ns: int) -> dict[str, Any]:
+    """A std_msgs/Header of a moment on the field."""
+    return {"stamp": stamp(time_ns), "frame_id": FRAME}
 
 
 def stamp(time_ns: int) -> dict[str, Any]:
