@@ -39,13 +39,14 @@ def test_faults_at_random_moments_lose_nothing(ros_domain: int) -> None:
     assert report["bags"] > 1
 
 
-def test_a_simulator_goes_on_with_the_episode_it_is_told(graph: Graph) -> None:
+def test_a_simulator_goes_on_with_the_episode_it_is_told(graph: Graph, ros_domain: int) -> None:
     graph.start_players(policy="learn")
-    graph.start_simulator(episodes=2, **PATIENT)
-    graph.play()
-    graph.executor.remove_node(graph.simulator)
-    graph.simulator.destroy_node()
-    graph.start_simulator(episodes=4, first_episode=2, **PATIENT)
+    first = Graph(ros_domain)
+    first.start_simulator(episodes=2, match_id=7, **PATIENT)
+    first.hook = lambda: graph.spin(0.0)
+    first.play()
+    first.close()
+    graph.start_simulator(episodes=4, match_id=7, first_episode=2, **PATIENT)
     graph.spin_until(lambda: not graph.simulator.conductor.roster.absent)
     graph.play()
     assert [episode.number for episode in graph.episodes] == [0, 1, 2, 3]

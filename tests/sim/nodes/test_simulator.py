@@ -185,6 +185,7 @@ def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
     known = graph.node.get_publishers_info_by_topic("told")[0].endpoint_gid
     assert {gid for _, gid in heard} == {bytes(known)}
     assert [deserialize_message(data, Episode).number for data, _ in heard] == numbers
+    graph.node.remove_waitable(inbox)
     inbox.destroy()
 
 

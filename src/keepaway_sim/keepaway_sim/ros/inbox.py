@@ -91,7 +91,7 @@ class Inbox(Waitable):
             self._subscription = _rclpy.Subscription(
                 node.handle, message_class, name, qos.get_c_qos_profile()
             )
-        self._hear, self._is_open, self._node = hear, True, node
+        self._hear, self._is_open = hear, True
         self._place = 0  # in the wait set
         self._bytes = _Bytes(allocator=_RCUTILS.rcutils_get_default_allocator())
         self._info = _MessageInfo()
@@ -148,6 +148,5 @@ class Inbox(Waitable):
     def destroy(self) -> None:
         """Listen no longer, whatever an executor still has in hand."""
         self._is_open = False
-        self._node.remove_waitable(self)
         self._subscription.destroy_when_not_in_use()
         _RCUTILS.rcutils_uint8_array_fini(self._bytes)
