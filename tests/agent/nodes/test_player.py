@@ -137,11 +137,13 @@ def test_a_name_without_a_place_in_the_match_is_never_ready(graph: Graph) -> Non
     assert not any(status.ready for status in said)
 
 
-def test_what_it_learned_goes_along_into_the_next_match(graph: Graph) -> None:
-    keeper = graph.start_player("keeper_1", policy="learn")
-    play_some(graph)
-    graph.executor.remove_node(graph.simulator)
-    graph.simulator.destroy_node()
+def test_what_it_learned_goes_along_into_the_next_match(graph: Graph, ros_domain: int) -> None:
+    graph.start_players(policy="learn")
+    keeper, first_match = graph.players["keeper_1"], Graph(ros_domain)
+    first_match.start_simulator(episodes=1, **PATIENT)
+    first_match.hook = lambda: graph.spin(0.0)
+    first_match.play()
+    first_match.close()
     assert keeper.agent is not None
     before = keeper.agent.learned("").values
     first, graph.episodes[:] = keeper.agent, []
