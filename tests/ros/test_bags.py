@@ -60,7 +60,7 @@ def replay(bag: Path, *arguments: str) -> str:
         capture_output=True,
         text=True,
         check=True,
-        timeout=120,
+        timeout=900,
     ).stdout
 
 

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("ros_domain")
 def check(*arguments: object) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, str(ROOT / "scripts" / "check_agent.py"), "--answer-timeout", "20"]
     return subprocess.run(
-        [*command, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=240
+        [*command, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=900
     )
 
 

@@ -106,7 +106,7 @@ def test_simulator_runs_from_the_workspace_until_it_is_interrupted(
         match = first_match(ros_domain)
     finally:
         simulator.send_signal(signal.SIGINT)
-        returned = simulator.wait(timeout=30)
+        returned = simulator.wait(timeout=900)
     assert (match.num_keepers, match.num_takers) == (4, 3)
     assert returned == 0
 

@@ -18,7 +18,7 @@ from keepaway_sim.bags.reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
 KEEPERS = ("keeper_1", "keeper_2", "keeper_3")
-PATIENCE = 240.0  # [s] for a match; a first start compiles
+PATIENCE = 900.0  # [s] for a match; a first start compiles
 
 pytestmark = pytest.mark.usefixtures("ros_domain")
 

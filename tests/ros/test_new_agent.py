@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("ros_domain")
 
 def run(script: str, *arguments: object, folder: Path = ROOT) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, str(ROOT / "scripts" / script), *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=900)
 
 
 def match(*arguments: object) -> dict[str, Any]:

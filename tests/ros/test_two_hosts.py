@@ -24,7 +24,7 @@ class Hosts(NamedTuple):
 
 
 def ip(*arguments: str) -> None:
-    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True, timeout=20)
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True, timeout=900)
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_a_match_is_played_across_hosts(hosts: Hosts, ros_domain: int, way: str)
     match += ["--keeper-agent", str(SMALLEST), "--elsewhere", "taker_1", "--elsewhere", "taker_2"]
     try:
         played = on(hosts.near, match, near)
-        out, err = played.communicate(timeout=240)
+        out, err = played.communicate(timeout=900)
         assert played.returncode == 0, err
         summary = json.loads(out.splitlines()[-1])
         assert len(summary["episode_cycles"]) == 2
@@ -86,4 +86,4 @@ def test_a_match_is_played_across_hosts(hosts: Hosts, ros_domain: int, way: str)
     finally:
         for taker in takers:
             taker.kill()
-            taker.communicate(timeout=20)
+            taker.communicate(timeout=900)

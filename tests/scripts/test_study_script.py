@@ -75,14 +75,14 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, c
         for number in signals:
             running.send_signal(number)
             time.sleep(0.05)
-        _, said = running.communicate(timeout=60)
+        _, said = running.communicate(timeout=900)
     assert running.returncode == code
     assert "Traceback" not in said
     assert "resource_tracker" not in said
     if code > 0:
         last = said.splitlines()[-1]
         assert last == f"study: stopped; go on with --resume --out {log.parent}"
-    assert psutil.wait_procs(workers, timeout=30)[1] == []  # none is left behind
+    assert psutil.wait_procs(workers, timeout=900)[1] == []  # none is left behind
     before = len(trials_in(log.parent))
     done = study(*arguments, "--resume")
     assert done.returncode == 0, done.stderr
@@ -98,7 +98,7 @@ def test_a_worker_that_is_killed_is_replaced_and_the_study_ends_with_the_same(wh
             assert running.poll() is None
             time.sleep(0.01)
         workers[0].kill()
-        _, said = running.communicate(timeout=600)
+        _, said = running.communicate(timeout=900)
     assert running.returncode == 0, said
     assert "was ended by SIGKILL (out of memory?); what it played is played again" in said
     assert "Traceback" not in said

@@ -113,14 +113,14 @@ def test_a_signal_ends_a_training_with_what_is_finished_saved(tmp_path, signals,
         for number in signals:
             stopped.send_signal(number)
             time.sleep(0.05)
-        _, said = stopped.communicate(timeout=60)
+        _, said = stopped.communicate(timeout=900)
     assert stopped.returncode == code
     assert said.decode().splitlines()[-1:] == [
         "train: stopped; the same command goes on from here"
     ], said.decode()
     assert "Traceback" not in said.decode()
     assert "resource_tracker" not in said.decode()
-    assert psutil.wait_procs(started, timeout=30)[1] == []
+    assert psutil.wait_procs(started, timeout=900)[1] == []
     for trial in out.glob("trial_*"):
         assert sorted(file.name for file in trial.iterdir()) == [
             "episodes.csv",

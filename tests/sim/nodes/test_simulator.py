@@ -2,6 +2,7 @@
 
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,9 @@ from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.ros import publishing
 from keepaway_sim.ros.inbox import Inbox
 from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE
+from keepaway_sim.settings import changed
 from keepaway_sim.task import Outcome
+from keepaway_sim.world.config import CYCLE_TIME
 
 SLOW_ENOUGH = 20.0  # [s] no answer is ever late
 OUTCOME = 24  # place of a perception's outcome among its bytes
@@ -102,17 +105,20 @@ def test_an_episode_whose_end_is_lost_teaches_nothing(
 
 
 def test_a_frozen_player_is_missing_and_joins_at_the_next_kick_off(graph: Graph) -> None:
-    simulator = graph.start_simulator(episodes=3, answer_timeout=QUICK)
+    match = graph.start_simulator(episodes=3, answer_timeout=SLOW_ENOUGH).conductor
     graph.start_players(policy="random")
     frozen = graph.players["keeper_2"]
-    graph.play(until=lambda: simulator.conductor.num_cycles >= 3)
+    graph.play(until=lambda: match.num_cycles >= 3)
     graph.executor.remove_node(frozen)
-    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
-    assert simulator.conductor.roster.absent == ["keeper_2"]
-    assert simulator.conductor.roster.seats[1].missed > 3
+    patient, match.settings = match.settings, changed(match.settings, {"answer_timeout": QUICK})
+    graph.play(until=lambda: "keeper_2" in match.roster.absent)
+    match.settings = patient  # from now on nobody else is late, however busy the machine is
+    graph.play(until=lambda: match.num_finished >= 1)
+    assert "keeper_2" in match.roster.absent
+    assert match.roster.seats[1].missed > 3
     graph.executor.add_node(frozen)
     graph.play()
-    assert simulator.conductor.roster.absent == []
+    assert match.roster.absent == []
     assert [episode.number for episode in graph.episodes] == [0, 1, 2]
 
 
@@ -248,14 +254,16 @@ def test_real_time_and_its_multiples_are_kept(graph: Graph) -> None:
     graph.play(until=lambda: simulator.conductor.num_cycles >= 1)
     began, first = time.monotonic(), simulator.conductor.num_cycles
     graph.play(until=lambda: simulator.conductor.num_cycles >= first + 40)
-    assert time.monotonic() - began == pytest.approx(1.0, abs=0.25)
+    assert (
+        time.monotonic() - began > 40 * CYCLE_TIME / 4.0 - 2 * CYCLE_TIME
+    )  # one is caught up with
 
 
 def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
-    simulator = graph.start_simulator(episodes=2, seed=4, answer_timeout=SLOW_ENOUGH)
+    match = graph.start_simulator(seed=4, answer_timeout=SLOW_ENOUGH).conductor
     graph.start_players()
-    graph.play(until=lambda: simulator.conductor.num_finished >= 1)
-    seen: dict[str, list[object]] = {}
+    graph.play(until=lambda: match.num_finished >= 1)
+    seen: dict[str, list[Any]] = {}
     for topic, message, qos in (
         ("match", Match, LATCHED),
         ("/clock", Clock, 10),
@@ -264,19 +272,13 @@ def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
         ("diagnostics", DiagnosticArray, 10),
     ):
         graph.node.create_subscription(message, topic, seen.setdefault(topic, []).append, qos)
-    graph.spin_until(lambda: bool(seen["match"]))
-    graph.play()
-    graph.spin_until(lambda: all(seen.values()))
-    match, state = seen["match"][0], seen["field_state"][-1]
-    assert isinstance(match, Match)
-    assert (match.task, match.seed, match.player_names[-1]) == ("3v2", 4, "taker_2")
-    assert isinstance(state, FieldState)
+    graph.play(until=lambda: all(seen.values()) and len(seen["/clock"]) > 1)
+    told, state = seen["match"][0], seen["field_state"][-1]
+    assert (told.task, told.seed, told.player_names[-1]) == ("3v2", 4, "taker_2")
     assert len(state.positions) == 12
-    clock = seen["/clock"][-1]
-    assert isinstance(clock, Clock)
-    assert clock.clock == state.stamp != Time()
+    assert {seen["/clock"][k].clock.nanosec % 100_000_000 for k in (0, -1)} == {0}
+    assert state.stamp != Time()
     health = seen["diagnostics"][-1]
-    assert isinstance(health, DiagnosticArray)
     assert [status.name for status in health.status][:2] == ["/simulator", "/keeper_1"]
     assert health.status[1].message == "plays"
 

@@ -111,7 +111,7 @@ def test_a_second_writer_is_refused(tmp_path):
             target=_try_to_open, args=(tmp_path, answers)
         )
         other.start()
-        assert "another process is writing" in answers.get(timeout=60)
+        assert "another process is writing" in answers.get(timeout=900)
         other.join()
 
 
@@ -199,7 +199,7 @@ def test_of_two_studies_that_begin_one_folder_at_once_one_is_refused(tmp_path):
     ]
     for other in others:
         other.start()
-    said = [answers.get(timeout=120) for _ in others]
+    said = [answers.get(timeout=900) for _ in others]
     for other in others:
         other.join()
     (began,) = (each for each in said if isinstance(each, float))
