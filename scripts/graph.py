@@ -79,7 +79,7 @@ def echo(node: Node, topic: str, count: int) -> int:
     types = dict(node.get_topic_names_and_types()).get(topic)
     talkers = node.get_publishers_info_by_topic(topic)
     if not types or not talkers:
-        print(f"graph: nobody talks on {topic}", file=sys.stderr)
+        print(f"graph: nobody publishes on {topic}", file=sys.stderr)
         return 1
     latched = talkers[0].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     qos = QoSProfile(

@@ -1,0 +1,87 @@
+"""The scripts that measure and watch: what they print is what they saw."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def load(name: str) -> ModuleType:
+    """A script as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"scripts/checks/{name}.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> ModuleType:
+    return load("benchmark")
+
+
+@pytest.fixture(scope="module")
+def endurance() -> ModuleType:
+    return load("endurance")
+
+
+def test_a_short_benchmark_of_the_world_has_all_its_figures() -> None:
+    command = [sys.executable, str(ROOT / "scripts/checks/benchmark.py"), "--only", "world"]
+    options = ["--fields", "4", "--cycles", "60", "--json"]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout.splitlines()[-1])
+    expected = {"floor_us", "world_3v2_us", "learn_3v2_us", "learn_4v3_us", "learn_5v4_us"}
+    parts = {f"3v2_{part}_us" for part in ("commands", "pymunk", "perception", "decisions")}
+    assert expected | parts | {"peak_rss_mb"} <= set(figures)
+    assert all(value > 0 for name, value in figures.items() if name in expected | parts)
+
+
+def test_a_benchmarks_table_has_ratios_to_the_floor(benchmark: ModuleType) -> None:
+    lines = benchmark.table({"floor_us": 2.0, "world_us": 5.0, "compile_cold_s": 9.0}).splitlines()
+    assert lines[2].split() == ["world_us", "5.00", "2.5", "x", "floor"]
+    assert lines[3].split() == ["compile_cold_s", "9.00"]
+
+
+def test_what_grows_is_named_and_what_was_warming_up_is_not(
+    endurance: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steady = [endurance.Sample(100.0 + min(k, 5), 10, 3) for k in range(40)]
+    samples = {
+        "steady": steady,
+        "leaking": [endurance.Sample(100.0 + k, 10, 3) for k in range(40)],
+        "opening": [endurance.Sample(100.0, 10 + k, 3) for k in range(40)],
+    }
+    assert endurance.show(samples) == ["leaking", "opening"]
+    rows = capsys.readouterr().out.splitlines()
+    assert rows[1].split()[:4] == ["steady", "105.0", "->", "105.0"]
+    assert all(row.endswith(" 40") for row in rows[1:])
+
+
+def test_a_sample_is_what_a_process_uses(endurance: ModuleType) -> None:
+    before = endurance.sample(os.getpid())
+    held = bytearray(64 * 2**20)
+    held[::4096] = b"x" * len(held[::4096])
+    with open(os.devnull) as _, open(os.devnull) as _:
+        after = endurance.sample(os.getpid())
+    assert after.memory - before.memory > 50
+    assert after.handles == before.handles + 2
+    assert before.threads >= 1
+
+
+@pytest.mark.slow
+def test_a_short_endurance_run_ends_with_a_table(ros_domain: int) -> None:
+    command = [sys.executable, str(ROOT / "scripts/checks/endurance.py"), "--minutes", "0.2"]
+    options = ["--domain", str(ros_domain), "--port", "0"]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert "nothing is missing" in done.stdout, done.stderr
+    told = [line.split()[0] for line in done.stdout.splitlines() if "->" in line]
+    assert {"recorder_0", "viewer", "match", "simulator", "keeper_1", "taker_2"} <= set(told)
