@@ -60,7 +60,12 @@ def main() -> int:
     times = answer_times(simulator.log)
     print(report(verdicts, times))
     if args.json:
-        print(json.dumps({"verdicts": [v._asdict() for v in verdicts], "answer_times_s": times}))
+        print(
+            json.dumps(
+                {"verdicts": [v._asdict() for v in verdicts], "answer_times_s": times},
+                allow_nan=False,
+            )
+        )
     return 0 if all(verdict.holds for verdict in verdicts) else 1
 
 

@@ -26,7 +26,7 @@ def main() -> int:
         for number, path in enumerate(arguments.weights):
             weights = load_weights(path)
             if arguments.json:
-                print(json.dumps({"file": str(path), **to_metadata(weights)}))
+                print(json.dumps({"file": str(path), **to_metadata(weights)}, allow_nan=False))
             else:
                 print(("\n\n" if number else "") + f"{path}: {describe(weights)}")
             if arguments.draw:

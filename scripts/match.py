@@ -129,9 +129,9 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
         else {"policy": player["policy"]}
         for name, player in players.items()
     }
-    info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents)}
-    settings["record_info"] = json.dumps(info)
-    settings["record_attachments"] = json.dumps(weights_at_start(players))
+    info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents, allow_nan=False)}
+    settings["record_info"] = json.dumps(info, allow_nan=False)
+    settings["record_attachments"] = json.dumps(weights_at_start(players), allow_nan=False)
     return [
         Member("simulator", "simulator", arguments_of("simulator", args, settings)),
         *(
@@ -274,7 +274,7 @@ def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str
     if name != "simulator":
         return ["-p", "resume:=true"]
     first = ["-p", f"first_episode:={board.next_episode}"]
-    return [*first, "-p", f"record:={json.dumps(free_folder(args.record))}"]
+    return [*first, "-p", f"record:={json.dumps(free_folder(args.record), allow_nan=False)}"]
 
 
 def free_folder(record: str) -> str:
@@ -297,7 +297,7 @@ def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
         spread = "" if sem is None else f" +- {sem:.2f}"
         print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
     if args.json:
-        print(json.dumps({"task": args.task, "seed": args.seed, **summary}))
+        print(json.dumps({"task": args.task, "seed": args.seed, **summary}, allow_nan=False))
 
 
 def parse() -> argparse.Namespace:

@@ -195,7 +195,7 @@ def report(
         for durations, outcomes in episodes.values()
         for cycles, outcome in zip(durations, outcomes, strict=True)
     ]
-    ends = [durations[-LAST:].mean() * CYCLE_TIME for durations, _ in episodes.values()]
+    ends = [each[-LAST:].mean() * CYCLE_TIME for each, _ in episodes.values() if len(each)]
     numbers: dict[str, Any] = {
         "task": training.task,
         **summary(scores),
@@ -209,7 +209,7 @@ def report(
         "weights_sha256": folder.weights_hash(episodes) if folder else None,
     }
     if arguments.json:
-        print(json.dumps(numbers))
+        print(json.dumps(numbers, allow_nan=False))
     elif scores:
         print(
             f"{training.task}, {training.policy} keepers, {training.taker_policy} takers:"

@@ -18,9 +18,11 @@ import time
 from pathlib import Path
 
 import rclpy
+from rclpy.signals import SignalHandlerOptions
 
 from keepaway_sim.bags.marked import with_markers
 from keepaway_sim.bags.match_bag import MatchBag
+from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
@@ -57,25 +59,25 @@ def main() -> int:
 
 
 def watch(host: str, port: int, ros: list[str]) -> int:
-    """Serve the page of the match that is on, until Ctrl-C."""
-    rclpy.init(args=ros)
+    """Serve the page of the match that is on, until a signal ends it; the exit code."""
     try:
         server = Server(host, port)
-    except OSError as error:
+    except (OSError, OverflowError) as error:
         print(f"view: {host}:{port}: {error}", file=sys.stderr)
         return 1
-    spectator = Spectator(server.match)
-    print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
+    rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        while rclpy.ok():
-            spectator.poll()
-            time.sleep(POLL_PERIOD)
-    except KeyboardInterrupt:
-        pass
+        with Interruption():
+            spectator = Spectator(server.match)
+            print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
+            while True:
+                spectator.poll()
+                time.sleep(POLL_PERIOD)
+    except Stopped as stopped:
+        return stopped.code
     finally:
         server.close()
         rclpy.try_shutdown()
-    return 0
 
 
 def take_picture(args: argparse.Namespace, number: int) -> int:

@@ -50,7 +50,11 @@ def main() -> int:
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     figures["peak_rss_mb"] = max(own, children) / 1024.0
-    print(json.dumps({k: round(v, 3) for k, v in figures.items()}) if args.json else table(figures))
+    print(
+        json.dumps({k: round(v, 3) for k, v in figures.items()}, allow_nan=False)
+        if args.json
+        else table(figures)
+    )
     return 0
 
 
@@ -183,11 +187,11 @@ def measure_compile(_: argparse.Namespace) -> dict[str, float]:
     """Seconds until a first short training is over, machine code cached or not."""
     command = [sys.executable, __file__, "--only", "world", "--cycles", "10", "--json"]
     code = (
-        "import time; start = time.time()\n"
+        "import time; start = time.monotonic()\n"
         "from keepaway_agent.training.trainer import *\n"
         "trainer = Trainer(TrainerConfig(), 1)\n"
         "list(trainer.run([Trial(trial_seed(0, 0), StopRule(max_episodes=1))]))\n"
-        "print(time.time() - start)"
+        "print(time.monotonic() - start)"
     )
     figures = {}
     with tempfile.TemporaryDirectory() as cache:
@@ -204,8 +208,8 @@ def measure_processes(args: argparse.Namespace) -> dict[str, float]:
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import time, benchmark\n"
         "benchmark.trainer_time('3v2', 'learn', 128, 100); input()\n"
-        "start = time.time(); benchmark.trainer_time('3v2', 'learn', 128, int(sys.argv[2]))\n"
-        "print(time.time() - start)"
+        "start = time.monotonic(); benchmark.trainer_time('3v2', 'learn', 128, int(sys.argv[2]))\n"
+        "print(time.monotonic() - start)"
     )
 
     def wall(processes: int) -> float:

@@ -179,7 +179,7 @@ def main() -> int:
             rclpy.try_shutdown()
     show(report)
     if args.json:
-        print(json.dumps(report))
+        print(json.dumps(report, allow_nan=False))
     return 0
 
 

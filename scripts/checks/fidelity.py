@@ -52,7 +52,11 @@ def main() -> int:
         figure, name = draw_durations(measured), "fidelity.png"
     command = shlex.join(["scripts/checks/fidelity.py", *sys.argv[1:]])
     if arguments.json:
-        print(json.dumps({"code_version": code_version(), "command": command, **numbers}))
+        print(
+            json.dumps(
+                {"code_version": code_version(), "command": command, **numbers}, allow_nan=False
+            )
+        )
     else:
         print(f"{text}\n`{command}`, version {code_version()}")
     if arguments.out:

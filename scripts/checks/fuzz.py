@@ -261,7 +261,9 @@ def results() -> list[bytes]:
     head = {"study": {**study.settings, "trials": 1}, "command": "study.py", "code_version": "1"}
     trial = {"row": study.rows[0].name, "number": 0, "sources": [], "cycles": [50, 60]}
     trial |= {"greedy_cycles": [], "code_version": "1"}
-    return [b"\0".join(json.dumps(part).encode() for part in (head, trial)) + b"\n"]
+    return [
+        b"\0".join(json.dumps(part, allow_nan=False).encode() for part in (head, trial)) + b"\n"
+    ]
 
 
 def results_reader(folder: Path) -> Callable[[bytes], object]:
@@ -371,13 +373,13 @@ def live_page() -> Callable[[bytes], object]:
 
 def plain(parameters: Any) -> bytes:
     """Settings as JSON."""
-    return json.dumps(flat(parameters)).encode()
+    return json.dumps(flat(parameters), allow_nan=False).encode()
 
 
 def world_parameters() -> list[bytes]:
     """Every constant of the world by name, as JSON."""
     constants = {name: value for name, value in flat(Config()).items() if name != "profile"}
-    return [json.dumps(constants).encode()]
+    return [json.dumps(constants, allow_nan=False).encode()]
 
 
 def parameters_of(data: bytes, known: set[str]) -> dict[str, Any]:

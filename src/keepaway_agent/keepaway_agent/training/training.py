@@ -137,7 +137,9 @@ class Training:
         names = self.trainer.task.player_names
         info = {"command": command}
         if not self.shared:  # no player that learns alone could be checked against those
-            info["agents"] = json.dumps(dict(zip(names, self._agents(), strict=True)))
+            info["agents"] = json.dumps(
+                dict(zip(names, self._agents(), strict=True)), allow_nan=False
+            )
         starts = zip(names, self.start(), strict=False)
         files = {f"{name}.npz": _weights_bytes(weights) for name, weights in starts}
         wanted = None if episodes is None else frozenset(episodes).__contains__

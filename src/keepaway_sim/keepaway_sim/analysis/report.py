@@ -57,7 +57,7 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
     _write_table(analyst.rows(), output)
     tally, task = analyst.tally, bag.task
     summary = summarise(bag, tally) | {"missing": analyst.gaps.report()}
-    (output / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    (output / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     made_by = f"{bag.match['task']}, seed {bag.match['seed']}, {bag.match['code_version']}"
     for name, figure in (
         ("hold_time", hold_time_figure(np.array(tally.durations))),

@@ -103,7 +103,7 @@ def ros_arguments(
         if new:
             arguments += ["-r", f"{old}:={new}"]
     for parameter, value in parameters.items():
-        arguments += ["-p", f"{parameter}:={json.dumps(value)}"]
+        arguments += ["-p", f"{parameter}:={json.dumps(value, allow_nan=False)}"]
     return arguments
 
 

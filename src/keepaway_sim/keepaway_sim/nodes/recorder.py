@@ -119,7 +119,10 @@ class Recorder(Node):
         self._recorded = self.create_publisher(
             Time, "recorded", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         )
-        info = {"recorder": json.dumps(flat(self.settings)), "code_version": code_version()}
+        info = {
+            "recorder": json.dumps(flat(self.settings), allow_nan=False),
+            "code_version": code_version(),
+        }
         self.bag = BagWriter(self.settings.path, info, self.settings.compression)
 
     def poll(self) -> int:
@@ -154,7 +157,7 @@ class Recorder(Node):
                 break
             time.sleep(POLL_PERIOD)
         report = self.gaps.report()
-        self.bag.add_info(gaps=report, missing=json.dumps(self.gaps.missing()))
+        self.bag.add_info(gaps=report, missing=json.dumps(self.gaps.missing(), allow_nan=False))
         self.bag.close()
         return report
 

@@ -129,7 +129,7 @@ class FieldMessages:
                 "seed": seed,
                 "player_names": task.player_names,
                 "code_version": code_version(),
-                "config_json": json.dumps(config.to_dict()),
+                "config_json": json.dumps(config.to_dict(), allow_nan=False),
                 "first_episode": first_episode,
                 "match_id": self._match_id,
                 "visible_angle_deg": config.vision.visible_angle_deg,

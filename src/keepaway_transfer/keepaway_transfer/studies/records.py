@@ -8,7 +8,6 @@ blocks; learning curves are read there as well.
 """
 
 import dataclasses
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from keepaway_agent.files import moved_into_place
+from keepaway_agent.texts import shown
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer import metrics
 from keepaway_transfer.errors import StudyError
@@ -150,7 +150,7 @@ def read_records(path: Path) -> tuple[Record, ...]:
         raise StudyError(f"{path}: not a Parquet file: {error}") from error
     found = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
     if not FORMAT.items() <= found.items():
-        raise StudyError(f"{path}: not trials of a study: its metadata are {json.dumps(found)}")
+        raise StudyError(f"{path}: not trials of a study: its metadata are {shown(found)}")
     names = [field.name for field in dataclasses.fields(Record)]
     if missing := set(names) - set(table.column_names):
         raise StudyError(f"{path}: without the columns {', '.join(sorted(missing))}")
