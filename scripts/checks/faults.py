@@ -65,12 +65,12 @@ class Witness(Node):
         self.missing: Counter[str] = Counter()
         self.absent: set[str] | None = None
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_health, QUEUE)
+        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, QUEUE)
 
     def _on_episode(self, message: Episode) -> None:
         self.numbers.append(message.number)
 
-    def _on_health(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         absent = {s.name for s in message.status if s.level == DiagnosticStatus.ERROR}
         self.missing.update(absent - (self.absent or set()))
         self.absent = absent

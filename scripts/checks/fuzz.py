@@ -293,7 +293,7 @@ def request_taker(world: World) -> Callable[[bytes], object]:
     """Takes a request in a match that goes on; whatever is then played, the world can play."""
     roster = Roster(world.task, world.config)
     for player in range(world.task.num_players):
-        roster.welcome(player, b"own")
+        roster.take_seat(player, b"own")
 
     def take(data: bytes) -> object:
         roster.begin(world, 0.0)

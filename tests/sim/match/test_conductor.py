@@ -14,7 +14,7 @@ from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.wire import messages
 from keepaway_sim.wire.cdr import codec
-from keepaway_sim.wire.messages import Request, Saying, action_request, read_saying
+from keepaway_sim.wire.messages import MessageHead, Request, action_request, read_head
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.world import World
 
@@ -22,7 +22,7 @@ TASK = Task.parse("3v2")
 TIMEOUT = 2.0  # [s]
 PATIENCE = 100_000  # turns for a match to end
 
-Lossy = Callable[[str, Saying], bool]
+Lossy = Callable[[str, MessageHead], bool]
 """Whether a perception on a topic gets lost."""
 
 
@@ -62,7 +62,7 @@ class Stage:
     def repeat(self, topic: str, data: bytes) -> None:
         if not topic.endswith("/perception"):
             return
-        seen = read_saying(messages.PERCEPTION, data)
+        seen = read_head(messages.PERCEPTION, data)
         player = seen.player_index
         if seen.decision_due and player not in self.silent and not self.is_lost(topic, seen):
             asked = Request(player, seen.episode, seen.cycle, plain_answer(player), 0)
@@ -109,12 +109,10 @@ class Stage:
         self.match.play(self.spin, lambda: until() or next(turns, None) is None)
         assert next(turns, None) is not None, "the match did not end"
 
-    def sayings(self, player: int = 0) -> list[Saying]:
+    def sayings(self, player: int = 0) -> list[MessageHead]:
         """What one player perceived, in the order in which it was published first."""
         topic = f"{TASK.player_names[player]}/perception"
-        return [
-            read_saying(messages.PERCEPTION, data) for t, data, _ in self.published if t == topic
-        ]
+        return [read_head(messages.PERCEPTION, data) for t, data, _ in self.published if t == topic]
 
     def ended(self) -> list[tuple[int, int]]:
         """Cycles and outcome of every episode that was published."""
@@ -149,7 +147,7 @@ def test_a_match_is_what_the_world_plays_by_the_players_answers() -> None:
 def test_perceptions_that_are_lost_are_sent_again_and_change_nothing() -> None:
     stage, lost = Stage(episodes=2, seed=5), set()
 
-    def lose_each_once(topic: str, saying: Saying) -> bool:
+    def lose_each_once(topic: str, saying: MessageHead) -> bool:
         is_new = (topic, saying) not in lost
         lost.add((topic, saying))
         return is_new and saying.cycle % 7 == 3

@@ -33,7 +33,7 @@ def roster(world):
     """Everybody is there, and the first perceptions have been sent at time 0."""
     made = Roster(world.task, world.config)
     for player in range(world.task.num_players):
-        made.welcome(player)
+        made.take_seat(player)
     made.begin(world, now=0.0)
     return made
 
@@ -53,7 +53,7 @@ def new_episode(world, roster, now):
 def test_nobody_is_there_before_saying_so(world):
     roster = Roster(world.task, world.config)
     assert roster.absent == ["keeper_1", "keeper_2", "keeper_3", "taker_1", "taker_2"]
-    roster.welcome(TAKER)
+    roster.take_seat(TAKER)
     assert roster.absent == ["keeper_1", "keeper_2", "keeper_3", "taker_2"]
 
 
@@ -85,8 +85,8 @@ def test_without_answers_keepers_get_open_and_takers_go_to_the_ball(world, roste
 def test_who_does_not_answer_is_dismissed_and_not_waited_for(world, roster):
     for player in (0, 1, 2, 3):
         roster.take(player, answer(player))
-    assert roster.dismiss(TIMEOUT - 0.1, TIMEOUT) == []
-    assert roster.dismiss(TIMEOUT, TIMEOUT) == ["taker_2"]
+    assert roster.time_out(TIMEOUT - 0.1, TIMEOUT) == []
+    assert roster.time_out(TIMEOUT, TIMEOUT) == ["taker_2"]
     assert (roster.num_awaited, roster.absent) == (0, ["taker_2"])
     next_cycle(world, roster, now=3.0)
     assert roster.num_awaited == 4
@@ -94,10 +94,10 @@ def test_who_does_not_answer_is_dismissed_and_not_waited_for(world, roster):
 
 @pytest.mark.parametrize("by", ["status", "answer"])
 def test_who_is_back_joins_at_the_next_kick_off(world, roster, by):
-    roster.dismiss(TIMEOUT, TIMEOUT)
+    roster.time_out(TIMEOUT, TIMEOUT)
     assert roster.is_deserted
     if by == "status":
-        roster.welcome(TAKER)
+        roster.take_seat(TAKER)
     else:
         roster.take(TAKER, answer(TAKER))
     assert not roster.is_deserted
@@ -123,7 +123,7 @@ def test_who_is_always_late_is_not_missing(world, roster):
         before = int(seen.episode[0]), int(seen.cycle[0])
         next_cycle(world, roster, now=0.1 * cycle)
         roster.take(KEEPER, answer(KEEPER, *before))
-        assert "keeper_1" not in roster.dismiss(0.1 * cycle + 0.09, TIMEOUT)
+        assert "keeper_1" not in roster.time_out(0.1 * cycle + 0.09, TIMEOUT)
     assert roster.seats[KEEPER].late == 49
 
 
@@ -184,12 +184,12 @@ def test_a_seat_is_its_holders_until_that_is_missing(world, roster):
     request = answer(KEEPER, action=Action.PASS_BALL, target=MATE)
     for claim in (
         lambda: roster.take(KEEPER, request, b"second"),
-        lambda: roster.welcome(KEEPER, b"second"),
+        lambda: roster.take_seat(KEEPER, b"second"),
     ):
         with pytest.raises(KeepawayError, match="another process plays keeper_1"):
             claim()
     assert (roster.num_awaited, roster.seats[KEEPER].rejected) == (5, 1)
-    roster.dismiss(TIMEOUT, TIMEOUT)
+    roster.time_out(TIMEOUT, TIMEOUT)
     roster.take(KEEPER, request, b"second")
     with pytest.raises(KeepawayError, match="another process plays keeper_1"):
         roster.take(KEEPER, request, b"first")

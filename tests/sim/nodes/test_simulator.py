@@ -26,8 +26,8 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.ros import publishing
-from keepaway_sim.ros.inbox import Inbox
 from keepaway_sim.ros.publishing import ALL, LATCHED, QUEUE
+from keepaway_sim.ros.raw_subscription import RawSubscription
 from keepaway_sim.settings import changed
 from keepaway_sim.task import Outcome
 from keepaway_sim.world.config import CYCLE_TIME
@@ -182,7 +182,9 @@ def test_a_stranger_with_perfect_requests_moves_nobody(graph: Graph, ros_domain:
 
 def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
     heard: list[tuple[bytes, bytes]] = []
-    inbox = Inbox(graph.node, Episode, "told", lambda *one: heard.append(one), QUEUE)
+    subscription = RawSubscription(
+        graph.node, Episode, "told", lambda *one: heard.append(one), QUEUE
+    )
     publisher = graph.node.create_publisher(Episode, "told", QUEUE)
     numbers = [1, 3]
     for number in numbers:
@@ -191,8 +193,8 @@ def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
     known = graph.node.get_publishers_info_by_topic("told")[0].endpoint_gid
     assert {gid for _, gid in heard} == {bytes(known)}
     assert [deserialize_message(data, Episode).number for data, _ in heard] == numbers
-    graph.node.remove_waitable(inbox)
-    inbox.destroy()
+    graph.node.remove_waitable(subscription)
+    subscription.destroy()
 
 
 def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:

@@ -69,7 +69,7 @@ def play(
             crew.hire()
         yield from crew.results(watch)
     finally:
-        crew.dismiss()
+        crew.end()
 
 
 def _recorder_of(number: int, recorder: TrialRecorder | None) -> TrialRecorder | None:
@@ -149,7 +149,7 @@ class _Crew:
         worker = Worker(_work, self._training, self._num_fields)
         self._hired[worker.pipe] = _Hired(worker)
 
-    def dismiss(self) -> None:
+    def end(self) -> None:
         """End all processes."""
         for hired in self._hired.values():
             hired.worker.kill()

@@ -28,7 +28,7 @@ from keepaway_sim.wire.messages import (
     EPISODE,
     FIELD_STATE,
     PERCEPTION,
-    read_saying,
+    read_head,
 )
 
 _EVERY_CYCLE = (PERCEPTION, FIELD_STATE, ACTION_REQUEST)
@@ -106,7 +106,7 @@ class GapCounter:
             self._told.add(int(codec(EPISODE).decode(data)["number"]))
         if message_type not in _EVERY_CYCLE:
             return
-        about = read_saying(message_type, data)
+        about = read_head(message_type, data)
         moment = about.episode, about.cycle
         if message_type == ACTION_REQUEST:
             self._pair(about.player_index, moment, False)

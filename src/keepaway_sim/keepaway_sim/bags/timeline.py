@@ -19,7 +19,7 @@ from keepaway_sim.wire.messages import (
     EPISODE,
     FIELD_STATE,
     PERCEPTION,
-    read_saying,
+    read_head,
     stamp_of,
 )
 
@@ -46,10 +46,10 @@ class OwnTimes:
             if own is not None:
                 self._last = own
                 if message_type == PERCEPTION:
-                    self._remember(read_saying(PERCEPTION, data)[:2], own)
+                    self._remember(read_head(PERCEPTION, data)[:2], own)
                 return own
             if message_type == ACTION_REQUEST:
-                return self._times.get(read_saying(ACTION_REQUEST, data)[:2], self._last)
+                return self._times.get(read_head(ACTION_REQUEST, data)[:2], self._last)
         except struct.error as error:
             raise KeepawayError(f"{len(data)} bytes are no {message_type}: {error}") from error
         return self._last

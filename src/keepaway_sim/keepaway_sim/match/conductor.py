@@ -184,7 +184,7 @@ class Conductor:
             status = checked_status(data, player, seat.name)
             if not status["ready"] or status["match_id"] not in (0, self.match_id):
                 return
-            self.roster.welcome(player, sender)
+            self.roster.take_seat(player, sender)
         except KeepawayError as error:
             seat.rejected += 1
             self._warn_rejected(player, error)
@@ -280,7 +280,7 @@ class Conductor:
             self._spin(RESEND_PERIOD)
             if self._clock() > until:
                 self._log.error("a recorder is missing: the match goes on without it")
-                self.recorders.dismiss(self._messages.stamp_ns())
+                self.recorders.time_out(self._messages.stamp_ns())
 
     # A cycle.
 
@@ -336,7 +336,7 @@ class Conductor:
         """Send again what may have been lost, and give up on who does not answer."""
         self._remind_at = now + RESEND_PERIOD
         timeout, seen = self.settings.answer_timeout, self.world.belief
-        for name in self.roster.dismiss(now, timeout):
+        for name in self.roster.time_out(now, timeout):
             self._log.error(
                 f"{name} is missing: no answer for {timeout} s, episode {seen.episode[0]} cycle"
                 f" {seen.cycle[0]}; it does the default until it comes back"

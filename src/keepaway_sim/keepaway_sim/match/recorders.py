@@ -42,7 +42,7 @@ class RecorderProgress:
         """Whether one of them is too far behind to play on."""
         return self.lag(now_ns) > LARGEST_LAG
 
-    def dismiss(self, now_ns: int) -> None:
+    def time_out(self, now_ns: int) -> None:
         """Wait no longer for those that are too far behind."""
         oldest = now_ns - LARGEST_LAG * CYCLE_NS
         self._reached = {who: time for who, time in self._reached.items() if time >= oldest}

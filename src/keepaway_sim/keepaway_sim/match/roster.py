@@ -79,7 +79,7 @@ class Roster:
         """Is nobody there, and nobody coming?"""
         return not any(seat.present or seat.returning for seat in self.seats)
 
-    def welcome(self, player: int, sender: bytes = b"") -> None:
+    def take_seat(self, player: int, sender: bytes = b"") -> None:
         """A player says that it is ready: before the match it is present, later it returns.
 
         Args:
@@ -149,7 +149,7 @@ class Roster:
             if seat.present and self._due[player] and not seat.data and seat.waiting_since <= since
         ]
 
-    def dismiss(self, now: float, answer_timeout: float) -> list[str]:
+    def time_out(self, now: float, answer_timeout: float) -> list[str]:
         """Wait no longer for players who have not answered for `answer_timeout` [s].
 
         Returns:

@@ -65,7 +65,7 @@ class Scoreboard(Node):
         self._bar: tqdm[Any] | None = None
         self.create_subscription(Match, "match", self._on_match, MATCHES)
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_health, QUEUE)
+        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, QUEUE)
 
     @property
     def has_begun(self) -> bool:
@@ -143,7 +143,7 @@ class Scoreboard(Node):
         )
         return False
 
-    def _on_health(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         prefix = self.get_namespace().rstrip("/") + "/"
         for status in message.status:
             if not status.name.startswith(prefix) or status.hardware_id != str(self.match_id):

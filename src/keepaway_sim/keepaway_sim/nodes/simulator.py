@@ -33,15 +33,15 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
 from keepaway_sim.ros.diagnostics import diagnostics, player_statuses, simulator_status
-from keepaway_sim.ros.inbox import PROCESS_SIZE, Inbox
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.publishing import ALL, LATCHED, MATCHES, QUEUE, MatchPublisher
+from keepaway_sim.ros.raw_subscription import PROCESS_SIZE, RawSubscription
 from keepaway_sim.settings import same
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config, Physics, Skills, Vision, profile
 from keepaway_sim.world.world import World
 
-HEALTH_PERIOD = 1.0  # [s]
+DIAGNOSTICS_PERIOD = 1.0  # [s]
 LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 OWN_TOPICS = ("match", "episode", "field_state", "/clock")
 """No other node publishes these in a match."""
@@ -81,7 +81,7 @@ class Simulator(Node):
         self.conductor.count_recorders = partial(self.count_publishers, "recorded")
         self.conductor.on_begin = self._publish_diagnostics
         self.conductor.on_end = self._publish_last_diagnostics
-        self._health_at, self._health_cycles = time.monotonic(), 0
+        self._diagnosed_at, self._diagnosed_cycles = time.monotonic(), 0
         self._subscribe()
         self._offer()
         self.conductor.announce()
@@ -94,8 +94,8 @@ class Simulator(Node):
 
     def destroy_node(self) -> None:
         """Leave the graph."""
-        for inbox in self._inboxes:
-            inbox.destroy()
+        for subscription in self._raw_subscriptions:
+            subscription.destroy()
         super().destroy_node()
 
     def close(self) -> None:
@@ -131,17 +131,17 @@ class Simulator(Node):
         return bag
 
     def _subscribe(self) -> None:
-        self._inboxes = [
-            Inbox(self, message, f"{seat.name}/{topic}", partial(callback, player), qos)
+        self._raw_subscriptions = [
+            RawSubscription(self, message, f"{seat.name}/{topic}", partial(callback, player), qos)
             for player, seat in enumerate(self.conductor.roster.seats)
             for topic, message, callback, qos in (
                 ("action_request", ActionRequest, self._on_request, QUEUE),
                 ("status", AgentStatus, self._on_status, LATCHED),
             )
         ]
-        self._inboxes += [
-            Inbox(self, Match, "match", self.conductor.take_match, MATCHES),
-            Inbox(self, Time, "recorded", self.conductor.take_recorded, ALL),
+        self._raw_subscriptions += [
+            RawSubscription(self, Match, "match", self.conductor.take_match, MATCHES),
+            RawSubscription(self, Time, "recorded", self.conductor.take_recorded, ALL),
         ]
 
     def _offer(self) -> None:
@@ -150,7 +150,7 @@ class Simulator(Node):
         for action in (conductor.start, conductor.pause, conductor.reset):
             self.create_service(Trigger, action.__name__, partial(_on_trigger, action))
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
-        self.create_timer(HEALTH_PERIOD, self._publish_diagnostics)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
 
     def _on_request(self, player: int, data: bytes, gid: bytes) -> None:
         self.conductor.take_request(player, data, gid[:PROCESS_SIZE])
@@ -168,8 +168,8 @@ class Simulator(Node):
     def _publish_diagnostics(self) -> None:
         conductor, now = self.conductor, time.monotonic()
         seen, num_cycles = conductor.world.belief, conductor.num_cycles
-        recent = (num_cycles - self._health_cycles) / (now - self._health_at)
-        self._health_at, self._health_cycles = now, num_cycles
+        recent = (num_cycles - self._diagnosed_cycles) / (now - self._diagnosed_at)
+        self._diagnosed_at, self._diagnosed_cycles = now, num_cycles
         figures = {
             "episode": str(seen.episode[0]),
             "cycle": str(seen.cycle[0]),

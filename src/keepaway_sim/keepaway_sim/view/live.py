@@ -122,7 +122,7 @@ class LiveMatch:
         self._send(event)
 
     def _keep(self, message_type: str, data: bytes) -> None:
-        about = messages.read_saying(message_type, data)
+        about = messages.read_head(message_type, data)
         moment = self._moments.setdefault((about.episode, about.cycle), _Moment())
         if message_type == messages.FIELD_STATE:
             moment.state, moment.outcome = data, about.outcome

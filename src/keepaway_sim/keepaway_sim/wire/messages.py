@@ -65,7 +65,7 @@ def read_request(data: bytes) -> Request:
     return Request(*fields, *_MATCH_ID.unpack_from(data, end))
 
 
-class Saying(NamedTuple):
+class MessageHead(NamedTuple):
     """What a message of a cycle is about, without its contents."""
 
     episode: int
@@ -76,7 +76,7 @@ class Saying(NamedTuple):
     decision_due: bool = False  # of a Perception
 
 
-def read_saying(message_type: str, data: bytes) -> Saying:
+def read_head(message_type: str, data: bytes) -> MessageHead:
     """What the bytes of a FieldState, Perception or ActionRequest are about.
 
     Raises:
@@ -84,12 +84,12 @@ def read_saying(message_type: str, data: bytes) -> Saying:
     """
     if message_type == FIELD_STATE:
         sec, nanosec, episode, cycle, outcome = _STATE.unpack_from(data)
-        return Saying(episode, cycle, -1, sec * SECOND + nanosec, outcome)
+        return MessageHead(episode, cycle, -1, sec * SECOND + nanosec, outcome)
     if message_type == PERCEPTION:
         sec, nanosec, player, episode, cycle, outcome, due = _SEEN.unpack_from(data)
-        return Saying(episode, cycle, player, sec * SECOND + nanosec, outcome, due)
+        return MessageHead(episode, cycle, player, sec * SECOND + nanosec, outcome, due)
     player, episode, cycle = _REQUEST_HEAD.unpack_from(data)
-    return Saying(episode, cycle, player)
+    return MessageHead(episode, cycle, player)
 
 
 def read_match_id(data: bytes) -> int:

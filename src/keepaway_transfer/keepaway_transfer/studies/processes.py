@@ -107,7 +107,7 @@ class WorkerExecutor(Executor):
                 worker = self._make(call, worker)
         if worker:
             worker.pipe.close()  # by which it knows that there is no more
-            self._dismiss(worker)
+            self._end(worker)
 
     def _make(self, call: _Call, worker: Worker | None) -> Worker | None:
         """Make a call, at most ATTEMPTS times; the process for the next one."""
@@ -119,7 +119,7 @@ class WorkerExecutor(Executor):
                 succeeded, value = worker.pipe.recv()
             except (EOFError, OSError):
                 if worker:
-                    how = how_it_ended(code := self._dismiss(worker))
+                    how = how_it_ended(code := self._end(worker))
                 worker = None
                 if code >= 0 or self._killed:
                     break
@@ -139,7 +139,7 @@ class WorkerExecutor(Executor):
             self._workers.add(worker)
         return worker
 
-    def _dismiss(self, worker: Worker) -> int:
+    def _end(self, worker: Worker) -> int:
         with self._lock:
             self._workers.discard(worker)
         return worker.end()

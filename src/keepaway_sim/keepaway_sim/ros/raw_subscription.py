@@ -1,7 +1,7 @@
 """Messages as bytes together with who sent them.
 
 The middleware marks every message with its publisher's identity; rclpy of ROS 2 Jazzy does not
-hand it on. So an inbox is a subscription of its own kind (a `Waitable`), which takes messages with
+hand it on. So a raw subscription is a `Waitable` of its own, which takes messages with
 `rcl_take_serialized_message`, the function of ROS's C library that rclpy takes them with too.
 """
 
@@ -64,7 +64,7 @@ _RCUTILS.rcutils_get_default_allocator.restype = _Allocator
 _RCUTILS.rcutils_uint8_array_fini.argtypes = [ctypes.POINTER(_Bytes)]
 
 
-class Inbox(Waitable):
+class RawSubscription(Waitable):
     """Hears one topic for as long as its node lives."""
 
     def __init__(
