@@ -1,12 +1,10 @@
 """Dependence goes one way, ROS stays in the nodes, and every module is in its package's README."""
 
-import ast
 from pathlib import Path
 
 import pytest
+from modules import MODULES, SRC, imports, name_of
 
-SRC = Path(__file__).resolve().parents[2] / "src"
-MODULES = sorted(SRC.glob("keepaway_*/keepaway_*/**/*.py"))
 PACKAGES = sorted(SRC.glob("keepaway_*"))
 ALLOWED = {
     "keepaway_sim": {"keepaway_sim"},
@@ -14,20 +12,6 @@ ALLOWED = {
     "keepaway_transfer": {"keepaway_sim", "keepaway_agent", "keepaway_transfer"},
 }
 ROS = {"rclpy", "keepaway_msgs"}
-
-
-def name_of(module: Path) -> str:
-    """A module's dotted name, from its place."""
-    return ".".join(module.relative_to(SRC).parts[1:]).removesuffix(".py")
-
-
-def imports(module: Path) -> set[str]:
-    """The dotted names of all modules that a module imports, wherever in its text."""
-    nodes = list(ast.walk(ast.parse(module.read_text())))
-    plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    froms = [node for node in nodes if isinstance(node, ast.ImportFrom)]
-    members = {f"{node.module}.{alias.name}" for node in froms for alias in node.names}
-    return plain | members | {node.module or "" for node in froms}
 
 
 def packages(module: Path) -> set[str]:

@@ -1,4 +1,4 @@
-"""How compiled functions of arrays are made, and where their machine code is kept.
+"""How compiled functions of arrays are made and called.
 
 `compiled` is numba's `njit` with settings that fit small functions called millions of times a
 second on rows of arrays that others own: functions are compiled into their callers, because passing
@@ -7,55 +7,40 @@ for dividing by zero; arrays are not reference-counted, so such a function alloc
 into what it is given. Floating-point rules stay strict (no `fastmath`): the same bits from every
 caller.
 
-Machine code is kept on disk in a folder named by everything that it was made from: the sources of
-both packages that hold compiled functions, numba, numpy, Python and the processor. So it is never
-stale, whatever time stamps say, and checkouts of the same sources share it. Numba's own cache looks
-at one source file alone, and would go on using code into which an older callee was compiled.
-
-The packages of the world and of the agents share no code, so each has this same file; a contract
-test holds the two together.
+The packages of the world and of the agents share no code, so each has this same file and
+`machine_code.py`; a contract test holds the two together.
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import functools
-import hashlib
-import importlib.util
+import importlib
 import logging
 import os
-import platform
-import shutil
-import tempfile
+import pickle
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-import llvmlite.binding
-import numba
-import numpy as np
 from numba import config, njit, typeof
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
-SOURCES: Final = (
-    "actions.py",
-    "compiled.py",
-    "learning",
-    "playing",
-    "task.py",
-    "training/deciding.py",
-    "world",
-)
-"""Files and folders of both packages from which machine code is made."""
-KEPT_FOLDERS: Final = 8
-"""Folders of machine code that stay on disk; the least recently used ones go."""
+from .machine_code import SharedCache, cache_folder
 
 _SETTINGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _DISABLED: Final = bool(vars(config)["DISABLE_JIT"])
 _CHECKED: Final = os.environ.get("KEEPAWAY_CHECKED") == "1"
+_PATIENCE: Final = 0.05  # [s] between two looks at what is waited for
+_PROGRESS_PERIOD: Final = 5.0  # [s] between two reports
 _LOG = logging.getLogger(__name__)
 
 
@@ -76,6 +61,11 @@ def compiled_apart(function: Callable[..., Any]) -> Any:
     return _kept(njit(**settings, **_SETTINGS)(function))
 
 
+def compiled_with_arrays(function: Callable[..., Any]) -> Any:
+    """Compile a function of its own that makes arrays: they are reference-counted."""
+    return _kept(njit(pipeline_class=_EntryCompiler)(function))
+
+
 class Kernel:
     """The machine code of a compiled function, called with some of its arguments fixed.
 
@@ -92,18 +82,140 @@ class Kernel:
 
     def compile_for(self, *arguments: Any) -> None:
         """Compile for arguments of the types of these, so that the first call does not wait."""
-        if _DISABLED:
-            self._code = self._function
-            return
-        types = tuple(typeof(value) for value in (*self._frozen, *arguments))
-        code = self._function.compile(types)
-        self._code = self._code or code
+        prepare((self, arguments))
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function with the frozen arguments and these."""
         if self._code is None:
             self.compile_for(*arguments)
         return self._code(*self._frozen, *arguments)  # type: ignore[misc]
+
+    def _job(self, arguments: tuple[Any, ...]) -> _Job:
+        types = tuple(typeof(value) for value in (*self._frozen, *arguments))
+        return _Job(self._function, types)
+
+    def _load(self, job: _Job) -> None:
+        code = self._function.compile(job.types)
+        self._code = self._code or code
+
+
+def prepare(*calls: tuple[Kernel, tuple[Any, ...]]) -> None:
+    """Compile kernels for arguments of the types of these, those that are not compiled yet.
+
+    What no process has compiled before is compiled by child processes, as many at once as there
+    are processors; it says so on standard error, and goes on saying how far it is. The children end
+    with this process's wait, so that an interrupt ends it at once. Of several processes that want
+    the same code one compiles it, and the others wait.
+
+    Raises:
+        RuntimeError: a function cannot be compiled.
+    """
+    if _DISABLED:
+        for kernel, _ in calls:
+            kernel._code = kernel._function
+        return
+    jobs = [(kernel, kernel._job(arguments)) for kernel, arguments in calls]
+    _make([job for _, job in jobs if not job.is_made()])
+    for kernel, job in jobs:
+        kernel._load(job)
+
+
+class _Job(NamedTuple):
+    """A function to compile for arguments of some types."""
+
+    function: Any  # a dispatcher
+    types: tuple[Any, ...]
+
+    def is_made(self) -> bool:
+        """Is it compiled, here or on disk?"""
+        if self.types in self.function.overloads:
+            return True
+        cache = self.function._cache
+        if not isinstance(cache, SharedCache):
+            return False
+        kept = cache._cache_file
+        name = kept._load_index().get(
+            cache._index_key(self.types, self.function.targetctx.codegen())
+        )
+        return name is not None and Path(kept._data_path(name)).exists()
+
+    def begin(self) -> subprocess.Popen[bytes]:
+        """Begin to compile it in a child process, which keeps it on disk."""
+        code = (
+            "import pickle, sys; sys.path = pickle.load(sys.stdin.buffer)\n"
+            f"from {__name__} import _child; _child()"
+        )
+        child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+        name = self.function.py_func.__module__, self.function.py_func.__name__
+        assert child.stdin
+        with contextlib.suppress(BrokenPipeError), child.stdin:
+            child.stdin.write(pickle.dumps(sys.path) + pickle.dumps((*name, self.types)))
+        return child
+
+
+def _child() -> None:
+    """Compile what the parent asks for; it ends as soon as it is interrupted."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    module, name, types = pickle.load(sys.stdin.buffer)
+    function = getattr(importlib.import_module(module), name)
+    getattr(function, "entry", function).compile(types)
+
+
+def _make(jobs: list[_Job]) -> None:
+    """Compile what is on no disk yet; it is compiled here where there is no place to keep it."""
+    if not jobs:
+        return
+    names = ", ".join(job.function.py_func.__name__ for job in jobs)
+    folder, start = cache_folder(), time.monotonic()
+    _LOG.warning("compiles %s: once for these sources, up to a minute", names)
+    if folder is None:
+        for job in jobs:
+            job.function.compile(job.types)
+    else:
+        with _only_one(folder, start):
+            waiting = [job for job in jobs if not job.is_made()]
+            _run_children(waiting, start)
+    _LOG.warning("compiled %s in %.0f s", names, time.monotonic() - start)
+
+
+def _run_children(waiting: list[_Job], start: float) -> None:
+    """Compile in child processes; none of them outlives this."""
+    running: list[subprocess.Popen[bytes]] = []
+    num, said = len(waiting), time.monotonic()
+    try:
+        while waiting or running:
+            while waiting and len(running) < (os.cpu_count() or 1):
+                running.append(waiting.pop(0).begin())
+            time.sleep(_PATIENCE)
+            for child in [child for child in running if child.poll() is not None]:
+                running.remove(child)
+                if child.returncode == -signal.SIGINT:
+                    raise KeyboardInterrupt
+                if child.returncode != 0:
+                    raise RuntimeError("a function cannot be compiled: see above")
+            if time.monotonic() - said > _PROGRESS_PERIOD:
+                said, done = time.monotonic(), num - len(waiting) - len(running)
+                _LOG.warning("compiling: %d of %d done after %.0f s", done, num, said - start)
+    finally:
+        for child in running:
+            child.kill()
+            child.wait()
+
+
+@contextlib.contextmanager
+def _only_one(folder: Path, start: float) -> Iterator[None]:
+    """Hold the folder's lock; the processes that want it wait, and say so."""
+    with (folder / "lock").open("w") as lock:
+        said = start
+        while True:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            time.sleep(_PATIENCE)
+            if time.monotonic() - said > _PROGRESS_PERIOD:
+                said = time.monotonic()
+                _LOG.warning("waits for another process that compiles, %.0f s so far", said - start)
+        yield
 
 
 class _Inner(CPUDispatcher):
@@ -173,108 +285,5 @@ class _EntryCompiler(_InnerCompiler):
 def _kept(dispatcher: Any) -> Any:
     """Let a compiled function keep its machine code on disk, if there is a place for it."""
     if hasattr(dispatcher, "py_func") and cache_folder() is not None:  # not with DISABLE_JIT
-        dispatcher._cache = _SharedCache(dispatcher.py_func)
+        dispatcher._cache = SharedCache(dispatcher.py_func)
     return dispatcher
-
-
-@functools.cache
-def cache_folder() -> Path | None:
-    """Where machine code of these sources is kept; None (said once) where nothing can be written.
-
-    In `NUMBA_CACHE_DIR` if it is set, else in the user's cache folder.
-    """
-    for base in _places():
-        folder = base / "keepaway" / f"machine_code-{_fingerprint()[:24]}"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            os.utime(folder)
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError:
-            continue
-        _drop_old(folder)
-        return folder
-    _LOG.warning(
-        "machine code cannot be kept: no folder can be written (set NUMBA_CACHE_DIR to one);"
-        " each process compiles anew"
-    )
-    return None
-
-
-def _places() -> Iterator[Path]:
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(chosen)
-    if chosen := os.environ.get("XDG_CACHE_HOME"):
-        yield Path(chosen)
-    home = os.path.expanduser("~")  # noqa: PTH111 - Path.home() fails where there is none
-    if Path(home).is_absolute():
-        yield Path(home) / ".cache"
-
-
-@functools.cache
-def _fingerprint() -> str:
-    """A hash of all that machine code depends on."""
-    digest = hashlib.sha256()
-    versions = numba.__version__, llvmlite.__version__, np.__version__
-    processor = llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_CPU_NAME")
-    features = (
-        llvmlite.binding.get_host_cpu_features().flatten(),
-        os.environ.get("NUMBA_CPU_FEATURES"),
-    )
-    digest.update(repr((platform.python_version(), versions, processor, features)).encode())
-    for source in sources():
-        text = source.read_bytes()
-        digest.update(f"{source.name} {len(text)} ".encode() + text)
-    return digest.hexdigest()
-
-
-def sources() -> list[Path]:
-    """Every source file of both packages from which machine code is made."""
-    found: list[Path] = []
-    for package in ("keepaway_agent", "keepaway_sim"):
-        spec = importlib.util.find_spec(package)
-        if spec is None or spec.origin is None:
-            continue  # agents run without the simulator's package
-        for name in SOURCES:
-            place = Path(spec.origin).parent / name
-            found += sorted(place.rglob("*.py")) if place.is_dir() else [place][: place.is_file()]
-    return found
-
-
-def _drop_old(folder: Path) -> None:
-    """Remove folders of other sources but for those used last; others may do so at once."""
-    try:
-        known = sorted(folder.parent.glob("machine_code-*"), key=lambda path: path.stat().st_mtime)
-    except OSError:
-        return
-    for old in known[:-KEPT_FOLDERS]:
-        if old != folder:
-            shutil.rmtree(old, ignore_errors=True)
-
-
-class _Locator(_CacheLocator):
-    """Names numba the folder; its name says all that a source's time stamp would."""
-
-    def __init__(self, py_func: Any) -> None:
-        self._name = f"{py_func.__module__}-{py_func.__code__.co_firstlineno}"
-
-    def get_cache_path(self) -> str:
-        return str(cache_folder())
-
-    def get_source_stamp(self) -> str:
-        return _fingerprint()
-
-    def get_disambiguator(self) -> str:
-        return str(self._name)
-
-    @classmethod
-    def from_function(cls, py_func: Any, _py_file: str) -> _Locator:
-        return cls(py_func)
-
-
-class _SharedCacheImpl(CompileResultCacheImpl):
-    _locator_classes: list[Any] = [_Locator]  # noqa: RUF012 - as numba declares it
-
-
-class _SharedCache(FunctionCache):
-    _impl_class = _SharedCacheImpl

@@ -19,12 +19,12 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
+from keepaway_sim.bags.chunk_records import index_records
 from keepaway_sim.bags.chunks import (
     LOOSE_SIZE,
     MAX_CHUNK_SIZE,
     Chunk,
     Run,
-    index_records,
     read_chunk,
     read_packed,
     together,

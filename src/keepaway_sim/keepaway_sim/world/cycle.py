@@ -52,24 +52,9 @@ def _first_illegal(w, playing, action, target):
     return -1
 
 
-@compiled_apart
-def start(w, f):
-    """First kick-off of a trial: nothing of an earlier one remains."""
-    truth, belief, memory = w.truth, w.belief, w.memory
-    for p in range(w.num_players):
-        truth.yaw[f, p] = TWO_PI * (draw(w.random, f) - 0.5)
-        belief.body[f, p, :] = truth.yaw[f, p]
-        belief.neck[f, p] = 0.0
-        belief.position[f, p, :, :] = 0.0
-    memory.self_error[f, :, :] = 0.0
-    truth.time[f] = 0
-    truth.running[f] = True
-    belief.episode[f] = -1
-    _kick_off(w, f)
-
-
 @compiled
 def _kick_off(w, f):
+    """The next episode of field f begins."""
     c, truth, belief, speech = w.constants, w.truth, w.belief, w.speech
     referee.kick_off(w, f)
     truth.take_count[f] = 0

@@ -14,10 +14,11 @@ import numpy as np
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.world.bodies import Bodies
-from keepaway_sim.world.compiled import Kernel
+from keepaway_sim.world.compiled import Kernel, prepare
 from keepaway_sim.world.config import Config
 from keepaway_sim.world.constants import pack
-from keepaway_sim.world.cycle import act, settle, start
+from keepaway_sim.world.cycle import act, settle
+from keepaway_sim.world.geometry import TWO_PI
 from keepaway_sim.world.state import Belief, Truth, make_fields
 from keepaway_sim.world.streams import RandomStreams, StreamSnapshot
 
@@ -54,10 +55,9 @@ class World:
         self._streams = RandomStreams(num_fields, reserve=num * (num + 12) + 16)
         self.fields = make_fields(pack(task, config), self._bodies.discs, self._streams.draws)
         self._everywhere = np.ones(num_fields, dtype=np.bool_)
-        self._start = Kernel(start, self.fields)
         self._act, self._settle = Kernel(act, self.fields), Kernel(settle, self.fields)
-        self._act.compile_for(self._everywhere, self.truth.action, self.truth.target)
-        self._settle.compile_for(self._everywhere)
+        requests = self.truth.action, self.truth.target
+        prepare((self._act, (self._everywhere, *requests)), (self._settle, (self._everywhere,)))
 
     @property
     def truth(self) -> Truth:
@@ -82,7 +82,16 @@ class World:
         """
         self._check_field(field)
         self._streams.seed(field, np.random.default_rng(seed))
-        self._start(field)
+        draws, truth, belief = self.fields.random, self.truth, self.belief
+        num = self.task.num_players
+        truth.yaw[field] = TWO_PI * (draws.uniforms[field, :num] - 0.5)
+        draws.cursor[field] = num
+        belief.body[field] = truth.yaw[field, :, None]
+        belief.neck[field], belief.position[field] = 0.0, 0.0
+        self.fields.memory.self_error[field] = 0.0
+        truth.time[field], truth.running[field] = -1, True  # the kick-off takes it to 0
+        belief.episode[field], belief.outcome[field] = -1, Outcome.ABORTED
+        self._settle(np.arange(self.num_fields) == field)
 
     def stop(self, field: int) -> None:
         """Let a field rest: it is not simulated until it is started again."""
