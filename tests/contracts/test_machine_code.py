@@ -90,9 +90,7 @@ def checkout(tmp_path: Path) -> Checkout:
 
 
 @pytest.mark.parametrize("module", CALLERS)
-def test_a_changed_callee_of_another_file_counts(
-    checkout: Checkout, module: str
-) -> None:
+def test_a_changed_callee_of_another_file_counts(checkout: Checkout, module: str) -> None:
     assert checkout.ask(module)[0] == 10
     checkout.change_callee(2)  # of the same size, and no newer
     assert checkout.ask(module)[0] == 20

@@ -218,18 +218,50 @@ def test_velocities_lie_on_a_grid():
     assert (x, y) == approx((0.1, 1 / 3), abs=1e-9)
 
 
-def test_bodies_move_by_their_velocity_exactly_wherever_their_field_lies():
-    radius = np.array([0.3, 0.3, 0.085])
-    bodies = Bodies(40, radius, 25.0)
-    here = np.round(np.array([(1 / 3, -2 / 7), (4.1, 0.0), (-9.9, 3.3)]) * 2**30) / 2**30
-    step = np.round(np.array([(0.7, 1 / 9), (-1.0, 0.2), (2.1, -1.7)]) * 2**30) / 2**30
+GRID_RANDOM = np.random.default_rng(8)
+
+
+def on_grid(low, high, shape):
+    """Random multiples of 2**-30."""
+    return np.round(GRID_RANDOM.uniform(low, high, shape) * 2**30) / 2**30
+
+
+@pytest.mark.parametrize("num_fields", [1, 7, 40])
+def test_discs_move_by_their_velocity_to_the_last_bit_whether_pymunk_moves_them_or_not(num_fields):
+    bodies = Bodies(num_fields, np.array([0.3] * 5 + [0.085]), 25.0)
     discs = bodies.discs
-    discs.motion[:, :, :2] = here + discs.place[:, None, :]
-    discs.motion[:, :, 2:] = step
-    bodies.move()
-    assert not discs.touched.any()
-    moved = discs.motion[:, :, :2] - discs.place[:, None, :]
-    np.testing.assert_array_equal(moved, np.broadcast_to(here + step, moved.shape))
+    for cycle in range(300):
+        here = on_grid(-14.0, 14.0, (num_fields, 6, 2))
+        step = on_grid(-3.0, 3.0, (num_fields, 6, 2))
+        num_asked = 1 + cycle % num_fields
+        discs.num_asked[0], discs.asked[:] = num_asked, np.arange(num_fields)[::-1]
+        discs.motion[:, :, :2], discs.motion[:, :, 2:] = here + discs.place[:, None, :], step
+        bodies.move()
+        moved = discs.motion[:, :, :2] - discs.place[:, None, :]
+        np.testing.assert_array_equal(moved[:num_asked], (here + step)[:num_asked])
+
+
+def overlapping(position, radius):
+    """Do any two discs of a field overlap by more than what counts as touching?"""
+    gaps = np.linalg.norm(position[:, None] - position, axis=2) - radius[:, None] - radius
+    return bool((gaps[np.triu_indices(len(radius), 1)] < -1e-6).any())
+
+
+def test_no_overlap_escapes_the_pair_test_or_pymunk():
+    radius = np.array([0.3] * 5 + [0.085])
+    bodies = Bodies(32, radius, 25.0)
+    discs, found = bodies.discs, 0
+    discs.asked[:], discs.num_asked[0] = np.arange(32), 32
+    for _ in range(200):
+        here, step = on_grid(-2.0, 2.0, (32, 6, 2)), on_grid(-1.0, 1.0, (32, 6, 2))
+        discs.motion[:, :, :2], discs.motion[:, :, 2:] = here + discs.place[:, None, :], step
+        bodies.move()
+        for f in range(32):
+            if overlapping(here[f] + step[f], radius):
+                found += 1
+                assert physics.may_touch(here[f], step[f], radius)
+                assert discs.touched[f]
+    assert 500 < found < 6000
 
 
 def test_only_fields_in_which_discs_touch_are_named():
@@ -238,5 +270,9 @@ def test_only_fields_in_which_discs_touch_are_named():
     discs.motion[:, :, :2] = discs.place[:, None, :] + np.array([(0, 0), (4, 0), (8, 0)])
     discs.motion[7, 1, :2] = discs.place[7] + (0.5, 0.0)
     discs.motion[13, 2, 2:] = (-3.8, 0.0)  # a ball that rolls against a player
+    discs.asked[:15], discs.num_asked[0] = np.arange(15) + 3, 15
     bodies.move()
-    assert np.flatnonzero(discs.touched).tolist() == [7, 13]
+    assert np.flatnonzero(discs.touched).tolist() == [10, 16]
+    discs.num_asked[0] = 0
+    bodies.move()
+    assert not discs.touched.any()

@@ -404,6 +404,15 @@ def test_a_field_goes_on_from_a_snapshot_as_it_went_on_then(task, config):
         assert_same(snapshot(other, field), expected)
 
 
+def test_pymunk_is_asked_of_few_fields_only():
+    world = started(Task(3, 2), profile("2005"), list(range(32)))
+    requests, asked = Requests(world, list(range(32))), []
+    for _ in range(100):
+        world.step(*requests.draw())
+        asked.append(int(world.fields.bodies.num_asked[0]))
+    assert 0 < np.mean(asked) < 16
+
+
 def test_fields_that_do_not_play_stand_still():
     world = started(Task(3, 2), profile("v19"), [1, 2])
     requests = Requests(world, [1, 2])

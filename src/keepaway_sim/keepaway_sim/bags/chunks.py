@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import IO, NamedTuple
 
 import lz4.frame
-import numpy as np
 import zstandard
 
 from keepaway_sim.errors import KeepawayError

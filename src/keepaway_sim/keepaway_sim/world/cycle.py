@@ -88,9 +88,10 @@ def act(w, playing, action, target):
     illegal = _first_illegal(w, playing, action, target)
     if illegal >= 0:
         return illegal
+    w.bodies.num_asked[0] = 0
     for f in range(len(playing)):
+        w.bodies.slot[f] = -1
         if not (playing[f] and w.truth.running[f] and w.belief.outcome[f] == _IN_PLAY):
-            w.bodies.motion[f, :, 2:] = 0.0
             continue
         w.scratch.acceleration[:] = 0.0
         for p in range(w.num_players):
@@ -98,6 +99,8 @@ def act(w, playing, action, target):
             _carry_out(w, f, p)
         for o in range(w.ball + 1):
             _set_off(w, f, o)
+        if physics.may_touch(w.truth.position[f], w.truth.velocity[f], w.bodies.radius):
+            _ask_pymunk(w, f)
     return -1
 
 
@@ -161,15 +164,24 @@ def _kick(w, f, p, power, angle):
 
 @compiled
 def _set_off(w, f, o):
-    """Object o's velocity of this cycle, and its disc as pymunk is to move it."""
-    truth, motion, place = w.truth, w.bodies.motion, w.bodies.place
-    vx, vy = truth.velocity[f, o]
+    """Object o's velocity of this cycle."""
+    vx, vy = w.truth.velocity[f, o]
     ax, ay = w.scratch.acceleration[o]
     vx, vy = physics.moved_velocity(vx, vy, ax, ay, _limits(w, o), w.random, f)
-    truth.velocity[f, o, 0], truth.velocity[f, o, 1] = vx, vy
-    motion[f, o, 0] = truth.position[f, o, 0] + place[f, 0]
-    motion[f, o, 1] = truth.position[f, o, 1] + place[f, 1]
-    motion[f, o, 2], motion[f, o, 3] = vx, vy
+    w.truth.velocity[f, o, 0], w.truth.velocity[f, o, 1] = vx, vy
+
+
+@compiled
+def _ask_pymunk(w, f):
+    """Give field f the next slot, and write its discs as pymunk is to move them."""
+    truth, bodies = w.truth, w.bodies
+    slot = bodies.num_asked[0]
+    bodies.num_asked[0] = slot + 1
+    bodies.asked[slot], bodies.slot[f] = f, slot
+    for o in range(w.ball + 1):
+        for axis in range(2):
+            bodies.motion[slot, o, axis] = truth.position[f, o, axis] + bodies.place[slot, axis]
+            bodies.motion[slot, o, 2 + axis] = truth.velocity[f, o, axis]
 
 
 @compiled
@@ -205,15 +217,18 @@ def settle(w, playing):
 
 @compiled
 def _come_to_rest(w, f):
-    """Take over where pymunk moved the discs of field f, and part those that overlap."""
-    c, truth, motion, place = w.constants, w.truth, w.bodies.motion, w.bodies.place
+    """Where the discs of field f have moved; those that overlap are parted."""
+    c, truth, bodies, slot = w.constants, w.truth, w.bodies, w.bodies.slot[f]
     for o in range(w.ball + 1):
         decay = c.ball_decay if o == w.ball else c.player_decay
         for axis in range(2):
-            truth.position[f, o, axis] = motion[f, o, axis] - place[f, axis]
+            if slot >= 0:
+                truth.position[f, o, axis] = bodies.motion[slot, o, axis] - bodies.place[slot, axis]
+            else:
+                truth.position[f, o, axis] += truth.velocity[f, o, axis]
             truth.velocity[f, o, axis] = physics.on_grid(decay * truth.velocity[f, o, axis])
-    if w.bodies.touched[f]:
-        physics.separate(truth.position[f], truth.velocity[f], w.bodies.radius, w.scratch)
+    if bodies.touched[f]:
+        physics.separate(truth.position[f], truth.velocity[f], bodies.radius, w.scratch)
 
 
 @compiled

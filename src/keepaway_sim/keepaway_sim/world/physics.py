@@ -1,13 +1,14 @@
 """Movement, kicks and collisions of the soccer server.
 
 Order of one cycle (S: stadium.cpp `step`): commands set accelerations and turns, velocities follow
-(`dash_acceleration`, `turned_yaw`, `kick_acceleration`, `moved_velocity`), pymunk moves all
-discs of all fields and finds those that touch (`Bodies.move`), and `separate` pushes overlapping
-discs apart and reverses them by the server's rule.
+(`dash_acceleration`, `turned_yaw`, `kick_acceleration`, `moved_velocity`), discs move by them
+(where some `may_touch`, pymunk moves them and finds those that do: `Bodies.move`), and `separate`
+pushes overlapping discs apart and reverses them by the server's rule.
 
 Positions and velocities are kept on a grid of 2**-30 m. A field's place in the shared space is a
 multiple of a power of two, so adding it is exact and a field behaves to the last bit alike
-wherever it lies. The grid also absorbs the last bit in which processors' sines differ.
+wherever it lies, and whether pymunk moves it or not. The grid also absorbs the last bit in which
+processors' sines differ.
 """
 
 from __future__ import annotations
@@ -113,6 +114,25 @@ def moved_velocity(vx, vy, ax, ay, limits, draws, stream):
         vx += radius * math.cos(angle)
         vy += radius * math.sin(angle)
     return on_grid(vx), on_grid(vy)
+
+
+@compiled
+def may_touch(position, velocity, radius):
+    """Do any two discs overlap when each has moved by its velocity?
+
+    Args:
+        position, velocity: (num_objects, 2) of one field.
+        radius: (num_objects,) [m].
+    """
+    for i in range(len(radius)):
+        x, y = position[i, 0] + velocity[i, 0], position[i, 1] + velocity[i, 1]
+        for j in range(i + 1, len(radius)):
+            dx = position[j, 0] + velocity[j, 0] - x
+            dy = position[j, 1] + velocity[j, 1] - y
+            touching = radius[i] + radius[j]
+            if dx * dx + dy * dy < touching * touching:
+                return True
+    return False
 
 
 @compiled

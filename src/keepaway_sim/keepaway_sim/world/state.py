@@ -90,12 +90,18 @@ class Speech(NamedTuple):
 
 
 class Discs(NamedTuple):
-    """Players and ball as pymunk takes them; made by `Bodies`."""
+    """Players and ball of the fields of which pymunk is asked; made by `Bodies`.
 
-    motion: np.ndarray  # (F, P + 1, 4) x, y [m] in the shared space, vx, vy [m/cycle]
-    place: np.ndarray  # (F, 2) [m] where each field's origin lies in the shared space
+    Such a field takes a slot for a cycle: a place of its own in the shared space.
+    """
+
+    motion: np.ndarray  # (F, P + 1, 4) by slot: x, y [m] in the shared space, vx, vy [m/cycle]
+    place: np.ndarray  # (F, 2) by slot: [m] where a field's origin lies in the shared space
     radius: np.ndarray  # (P + 1,) [m]
-    touched: np.ndarray  # (F,) bool: discs of the field may touch
+    asked: np.ndarray  # (F,) int64 by slot: the field
+    num_asked: np.ndarray  # (1,) int64: how many slots are taken
+    slot: np.ndarray  # (F,) int64 by field: its slot; -1: none, its discs touch nothing
+    touched: np.ndarray  # (F,) bool by field: discs touch
 
 
 class Scratch(NamedTuple):

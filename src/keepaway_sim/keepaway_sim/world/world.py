@@ -28,7 +28,7 @@ class FieldSnapshot(NamedTuple):
 
     task: Task
     config: Config
-    rows: list[np.ndarray]  # of the arrays of `Fields`, positions relative to the field
+    rows: list[np.ndarray]  # of the arrays of `Fields`
     random: StreamSnapshot
 
 
@@ -97,7 +97,6 @@ class World:
         """Let a field rest: it is not simulated until it is started again."""
         self.truth.running[field] = False
         self.belief.decision_due[field] = False
-        self.fields.bodies.motion[field, :, 2:] = 0.0
 
     def abort(self, field: int) -> None:
         """End a field's episode from outside; its next step kicks off a new one."""
@@ -141,7 +140,6 @@ class World:
         """
         self._check_field(field)
         rows = [array[field].copy() for array in self._arrays]
-        rows[-1][:, :2] -= self.fields.bodies.place[field]
         return FieldSnapshot(self.task, self.config, rows, self._streams.snapshot(field))
 
     def restore(self, field: int, snapshot: FieldSnapshot) -> None:
@@ -162,14 +160,13 @@ class World:
             )
         for array, row in zip(self._arrays, snapshot.rows, strict=True):
             array[field] = row
-        self.fields.bodies.motion[field, :, :2] += self.fields.bodies.place[field]
         self._streams.restore(field, snapshot.random)
 
     @functools.cached_property
     def _arrays(self) -> list[np.ndarray]:
-        """All arrays with a row for each field that outlive a cycle; the discs' motion is last."""
+        """All arrays with a row for each field that outlive a cycle."""
         w = self.fields
-        return [*w.truth, *w.belief, *w.memory, *w.speech, w.bodies.motion]
+        return [*w.truth, *w.belief, *w.memory, *w.speech]
 
     def _check_field(self, field: int) -> None:
         if not 0 <= field < self.num_fields:
