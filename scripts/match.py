@@ -28,7 +28,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
-from keepaway_agent.nodes.player import Player
+from keepaway_agent.nodes.player import PlayerNode
 from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
 from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
@@ -200,7 +200,7 @@ def play_in_one_process(
     options = [{"cli_args": each.arguments, "use_global_arguments": False} for each in team]
     simulator = Simulator(**options[0])
     players = [
-        Player(Role[each.program.upper()], **option)
+        PlayerNode(Role[each.program.upper()], **option)
         for each, option in zip(team[1:], options[1:], strict=True)
     ]
     for node in (simulator, *players):

@@ -27,8 +27,8 @@ from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import StudyError
-from keepaway_transfer.studies.batch import play
-from keepaway_transfer.studies.experiment import Progress, run
+from keepaway_transfer.studies.batch import play_batch
+from keepaway_transfer.studies.experiment import StudyProgress, run
 from keepaway_transfer.studies.processes import WorkerExecutor
 from keepaway_transfer.studies.results import open_results, pack
 from keepaway_transfer.studies.study import Study, load_study
@@ -68,11 +68,13 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
         ) as results,
         _executor(arguments) as executor,
     ):
-        progress = Progress(study, results.done)
+        progress = StudyProgress(study, results.done)
         with tqdm(
             total=progress.trials, initial=progress.done, disable=None, bar_format=BAR
         ) as bar:
-            for trial in run(study, results, executor, play, arguments.batch, interruption.shield):
+            for trial in run(
+                study, results, executor, play_batch, arguments.batch, interruption.shield
+            ):
                 progress.add(trial)
                 bar.set_description_str(str(progress), refresh=False)
                 bar.update()

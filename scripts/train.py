@@ -33,7 +33,7 @@ from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import RECORDED_TRIAL, Training
 from keepaway_agent.training.trial import Progress
 from keepaway_agent.training.trial_recorder import TrialRecorder
-from keepaway_agent.training.workers import NUM_FIELDS, play
+from keepaway_agent.training.workers import NUM_FIELDS, play_trials
 from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import add_options, chosen, numbers_in
 from keepaway_sim.errors import KeepawayError
@@ -140,7 +140,7 @@ def train(
 
         try:
             spread = arguments.processes, arguments.fields
-            for result in play(training, numbers, *spread, watch, recorder):
+            for result in play_trials(training, numbers, *spread, watch, recorder):
                 if folder:
                     with interruption.shield():
                         folder.save(result)

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from keepaway_agent.actions import Role
 from keepaway_agent.learning.weights import LearnedWeights
-from keepaway_agent.nodes.player import Player
+from keepaway_agent.nodes.player import PlayerNode
 from keepaway_agent.playing.agent import Agent, AgentConfig, MatchFacts
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialResult, trial_seed
@@ -37,7 +37,7 @@ class Graph:
         self.executor = EventsExecutor(context=self.context)
         self.hook: Callable[[], None] = lambda: None
         self.simulator: Simulator
-        self.players: dict[str, Player] = {}
+        self.players: dict[str, PlayerNode] = {}
         self.episodes: list[Episode] = []
         self.node = self.add(Node("spectator", context=self.context))
         self.node.create_subscription(Episode, "episode", self.episodes.append, ALL)
@@ -53,9 +53,9 @@ class Graph:
         )
         return self.simulator
 
-    def start_player(self, name: str, **parameters: object) -> Player:
+    def start_player(self, name: str, **parameters: object) -> PlayerNode:
         arguments = ros_arguments(parameters, name)
-        player = Player(
+        player = PlayerNode(
             Role[name.partition("_")[0].upper()],
             context=self.context,
             cli_args=arguments,

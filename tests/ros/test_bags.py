@@ -16,7 +16,7 @@ from recorded import record_match
 from rosbags.highlevel import AnyReader
 
 from keepaway_agent.actions import Role
-from keepaway_agent.nodes.player import Player
+from keepaway_agent.nodes.player import PlayerNode
 from keepaway_msgs.msg import ActionRequest
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
@@ -203,7 +203,7 @@ def test_a_keeper_fed_from_a_bag_answers_what_it_answered(graph: Graph, tmp_path
         lambda data: answers.append(clean_request(data)), 100, raw=True,
     )  # fmt: skip
     learner = ros_arguments({"policy": "learn"}, "keeper_2", "/again")
-    graph.add(Player(Role.KEEPER, cli_args=learner, **own))
+    graph.add(PlayerNode(Role.KEEPER, cli_args=learner, **own))
     count = replayer.play(graph.executor.spin_once)
     assert count == 1 + BagReader(tmp_path / "bag").counts["/keeper_2/perception"]
     graph.spin_until(lambda: len(answers) >= len(recorded))

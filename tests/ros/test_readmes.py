@@ -12,7 +12,7 @@ from rclpy.node import Node
 from recorded import record_match
 
 from keepaway_agent.actions import Role
-from keepaway_agent.nodes.player import Player
+from keepaway_agent.nodes.player import PlayerNode
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
@@ -23,7 +23,7 @@ from keepaway_sim.nodes.spectator import Spectator
 from keepaway_sim.task import Task
 from keepaway_sim.view.live import LiveMatch
 from keepaway_sim.world.config import Config
-from keepaway_transfer.nodes.transfer import Transfer
+from keepaway_transfer.nodes.transfer import TransferNode
 
 SRC = Path(__file__).resolve().parents[2] / "src"
 EVERY_NODE_HAS = ("use_sim_time", "start_type_description_service")
@@ -56,14 +56,14 @@ NODES = {
     ),
     **{
         f"{role.name.lower()}_1": Documented(
-            partial(Player, role),
+            partial(PlayerNode, role),
             "keepaway_agent",
             ("What a player learns with", "The players' nodes: keeper and taker"),
             player=f"{role.name.lower()}_1",
         )
         for role in Role
     },
-    "transfer": Documented(Transfer, "keepaway_transfer", ("The transfer node",)),
+    "transfer": Documented(TransferNode, "keepaway_transfer", ("The transfer node",)),
 }
 
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from keepaway_transfer.reports.kwy import write_kwy
-from keepaway_transfer.studies.results import Trial, open_results
+from keepaway_transfer.studies.results import StudyTrial, open_results
 from keepaway_transfer.studies.study import load_study
 
 SCRIPT = Path(__file__).parents[2] / "scripts/analyze.py"
@@ -23,7 +23,9 @@ def test_a_results_folder_gets_its_report(tmp_path):
     ) as results:
         for row in ("0", "4"):
             for number in range(2):
-                results.append(Trial(row, number, (), (40, 50, 60, 70, 80 + number), (60,), "v1"))
+                results.append(
+                    StudyTrial(row, number, (), (40, 50, 60, 70, 80 + number), (60,), "v1")
+                )
     done = analyze(tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "| row | trials | reached |" in done.stdout
@@ -38,7 +40,7 @@ def test_a_report_elsewhere_is_one_that_can_be_analysed_again(tmp_path):
         for row in ("0", "4"):
             for number in range(2):
                 cycles = (40, 50, 60, 70, 80 + number)
-                results.append(Trial(row, number, (), cycles, (60,), "v1"))
+                results.append(StudyTrial(row, number, (), cycles, (60,), "v1"))
     assert analyze(run, "--out", published).returncode == 0
     assert analyze(published, "--out", again).returncode == 0
     names = {path.name for path in published.iterdir()}

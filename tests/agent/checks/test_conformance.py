@@ -13,9 +13,9 @@ from keepaway_agent.checks.conformance import (
     READY,
     Exchange,
     Garbage,
-    Match,
     Pause,
     Request,
+    ScriptedMatch,
     Shown,
     script,
 )
@@ -31,7 +31,7 @@ def well_behaved(name: str = "keeper_2") -> list[Exchange]:
     """The log of an agent that does everything right."""
     log = []
     for step in script(name):
-        exchange = Exchange(step, ready=isinstance(step, Match))
+        exchange = Exchange(step, ready=isinstance(step, ScriptedMatch))
         if isinstance(step, Shown) and step.due and not step.is_garbage:
             exchange.requests, exchange.answer_time = [answer(step)], 0.001
         log.append(exchange)
@@ -57,7 +57,7 @@ def test_the_script_has_something_of_every_chapter_and_is_the_same_for_a_seed() 
     first, second = (list(script("taker_1", seed=4)) for _ in range(2))
     shown = [step for step in first if isinstance(step, Shown)]
     assert {step.chapter for step in shown if step.due} == set(CHAPTERS)
-    assert {Match, Shown, Garbage, Pause} == {type(step) for step in first}
+    assert {ScriptedMatch, Shown, Garbage, Pause} == {type(step) for step in first}
     again = [step for step in second if isinstance(step, Shown)]
     assert [(s.moment, s.due, s.stamp) for s in shown] == [
         (s.moment, s.due, s.stamp) for s in again
@@ -66,8 +66,10 @@ def test_the_script_has_something_of_every_chapter_and_is_the_same_for_a_seed() 
 
 
 def test_the_script_for_one_size_has_no_other() -> None:
-    matches = {step for step in script("keeper_1", one_size=True) if isinstance(step, Match)}
-    assert matches == {Match(3, 2)}
+    matches = {
+        step for step in script("keeper_1", one_size=True) if isinstance(step, ScriptedMatch)
+    }
+    assert matches == {ScriptedMatch(3, 2)}
 
 
 def test_a_name_that_does_not_play_is_refused() -> None:

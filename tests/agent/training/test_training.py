@@ -20,7 +20,7 @@ from keepaway_agent.settings import build, changed
 from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import Progress
-from keepaway_agent.training.workers import play
+from keepaway_agent.training.workers import play_trials
 from keepaway_sim.errors import KeepawayError
 
 SCRIPT = Path(__file__).parents[3] / "scripts/train.py"
@@ -39,8 +39,10 @@ def by_number(results):
 
 def test_the_number_of_processes_and_fields_changes_nothing():
     told: list[Progress] = []
-    alone = by_number(play(SHORT, [0, 1, 2, 5], processes=1, num_fields=3))
-    spread = by_number(play(SHORT, [0, 1, 2, 5], processes=2, num_fields=1, watch=told.append))
+    alone = by_number(play_trials(SHORT, [0, 1, 2, 5], processes=1, num_fields=3))
+    spread = by_number(
+        play_trials(SHORT, [0, 1, 2, 5], processes=2, num_fields=1, watch=told.append)
+    )
     assert sorted(alone) == sorted(spread) == [0, 1, 2, 5]
     for number, result in alone.items():
         np.testing.assert_array_equal(result.durations, spread[number].durations)
@@ -52,13 +54,13 @@ def test_the_number_of_processes_and_fields_changes_nothing():
 def test_an_error_in_a_process_is_raised_here(tmp_path):
     lost = changed(SHORT, {"load_weights": str(tmp_path / "none.npz")})
     with pytest.raises(ValueError, match=r"none\.npz cannot be read"):
-        list(play(lost, [0, 1], processes=2))
+        list(play_trials(lost, [0, 1], processes=2))
 
 
 def test_a_folder_holds_what_was_trained(tmp_path):
     training = changed(SHORT, {"taker_policy": "learn"})
     folder = TrainingFolder(tmp_path / "out", training, "scripts/train.py --episodes 4")
-    (result,) = play(training, [3])
+    (result,) = play_trials(training, [3])
     folder.save(result)
     assert folder.done == [3]
     durations, outcomes = folder.episodes(3)
@@ -84,13 +86,13 @@ def test_a_folder_holds_what_was_trained(tmp_path):
 
 def test_the_first_trials_team_lies_in_the_folder_itself_and_can_be_trained_on(tmp_path):
     first = TrainingFolder(tmp_path / "first", SHORT)
-    for result in play(SHORT, [0]):
+    for result in play_trials(SHORT, [0]):
         first.save(result)
     names = sorted(file.name for file in first.path.glob("*.npz"))
     assert names == ["keeper_1.npz", "keeper_2.npz", "keeper_3.npz"]
     more = changed(SHORT, {"load_weights": str(first.path)})
     second = TrainingFolder(tmp_path / "second", more)
-    for result in play(more, [0]):
+    for result in play_trials(more, [0]):
         second.save(result)
     earlier, later = (load_weights(f.path / "keeper_3.npz") for f in (first, second))
     assert later.episodes == 8
@@ -147,7 +149,7 @@ def test_settings_with_which_nothing_can_be_trained_are_refused(settings, words)
 
 def test_weights_of_another_task_are_refused(tmp_path):
     folder = TrainingFolder(tmp_path / "3v2", SHORT)
-    for result in play(SHORT, [0]):
+    for result in play_trials(SHORT, [0]):
         folder.save(result)
     larger = Training(task="4v3", load_weights=str(folder.path / "keeper_1.npz"))
     with pytest.raises(WeightsError, match=r"keeper in 3v2, not of a keeper in 4v3"):
@@ -158,7 +160,7 @@ def test_the_script_says_how_it_went(tmp_path):
     done = train("--episodes", 5, "--trials", 2, "--policy", "hold", "--seed", 4, "--json")
     assert done.returncode == 0
     numbers = json.loads(done.stdout.splitlines()[-1])
-    results = by_number(play(Training(episodes=5, policy="hold", seed=4), [0, 1]))
+    results = by_number(play_trials(Training(episodes=5, policy="hold", seed=4), [0, 1]))
     durations = np.concatenate([results[0].durations, results[1].durations]) * 0.1
     outcomes = np.concatenate([results[0].outcomes, results[1].outcomes])
     assert numbers["task"] == "3v2"
@@ -226,7 +228,7 @@ def test_a_training_stopped_by_ctrl_c_goes_on_where_it_was(tmp_path):
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     assert json.loads(again.stdout)["trials"] == 6
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
-    whole = by_number(play(Training(episodes=300), range(6)))
+    whole = by_number(play_trials(Training(episodes=300), range(6)))
     folder = TrainingFolder(out, Training(episodes=300), any_code=True)
     for number in range(6):
         np.testing.assert_array_equal(folder.episodes(number)[0], whole[number].durations)

@@ -10,7 +10,7 @@ from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.training.folder import TrainingFolder
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import TrialResult
-from keepaway_agent.training.workers import play
+from keepaway_agent.training.workers import play_trials
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.verify import check_world
@@ -31,7 +31,7 @@ def record(
 ) -> dict[int, TrialResult]:
     """The results of a training whose first trial is recorded to `path`."""
     recorder = training.recorder(path, wanted)
-    results = list(play(training, range(trials), processes, recorder=recorder))
+    results = list(play_trials(training, range(trials), processes, recorder=recorder))
     return {result.trial.label: result for result in results}
 
 
@@ -75,7 +75,7 @@ def test_chosen_episodes_are_those_of_the_whole_recording(whole, tmp_path):
 
 
 def test_recording_changes_nothing_in_any_number_of_processes(whole, tmp_path):
-    alone = {r.trial.label: r.durations.tolist() for r in play(TRAINING, range(3))}
+    alone = {r.trial.label: r.durations.tolist() for r in play_trials(TRAINING, range(3))}
     recorded = record(tmp_path / "bag", trials=3, processes=2)
     assert {k: r.durations.tolist() for k, r in recorded.items()} == alone
     assert MatchBag(tmp_path / "bag").reader.message_count == whole[0].reader.message_count
@@ -83,7 +83,7 @@ def test_recording_changes_nothing_in_any_number_of_processes(whole, tmp_path):
 
 def test_keepers_that_began_with_weights_are_checked_with_them(tmp_path):
     folder = TrainingFolder(tmp_path / "weights", TRAINING)
-    for result in play(TRAINING, [0]):
+    for result in play_trials(TRAINING, [0]):
         folder.save(result)
     going_on = Training(episodes=5, policy="greedy", load_weights=str(folder.path), learner=LEARNER)
     record(tmp_path / "bag", going_on)

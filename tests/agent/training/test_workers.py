@@ -31,7 +31,7 @@ def workers_of(process: int) -> list[psutil.Process]:
 
 
 def test_what_a_killed_process_had_is_played_again_and_gives_the_same(caplog, tmp_path):
-    alone = {r.trial.label: r for r in workers.play(TRAINING, range(6))}
+    alone = {r.trial.label: r for r in workers.play_trials(TRAINING, range(6))}
     killed: list[int] = []
 
     def kill_one(_: Progress) -> None:
@@ -41,7 +41,7 @@ def test_what_a_killed_process_had_is_played_again_and_gives_the_same(caplog, tm
 
     recorder = TRAINING.recorder(tmp_path / "bag")
     spread = {}
-    for result in workers.play(TRAINING, range(6), 2, 2, kill_one, recorder):
+    for result in workers.play_trials(TRAINING, range(6), 2, 2, kill_one, recorder):
         assert result.trial.label not in spread
         spread[result.trial.label] = result
     assert killed
@@ -63,7 +63,7 @@ def test_processes_that_are_killed_again_and_again_end_the_run_in_words(monkeypa
 
     endless = Training(episodes=10**6)
     with pytest.raises(AgentError, match=r"in a row were lost, the last was ended by SIGKILL"):
-        list(workers.play(endless, range(2), 2, 1, kill_all))
+        list(workers.play_trials(endless, range(2), 2, 1, kill_all))
     assert workers_of(os.getpid()) == []
 
 
@@ -75,7 +75,7 @@ def test_a_process_that_fails_by_itself_is_not_started_again(monkeypatch):
     monkeypatch.setattr(workers, "_work", lambda *_: None)
     monkeypatch.setattr(workers, "Worker", lambda *_: Worker(_fail))
     with pytest.raises(AgentError, match="ended with code 3"):
-        list(workers.play(TRAINING, range(2), 2))
+        list(workers.play_trials(TRAINING, range(2), 2))
 
 
 def test_two_trainings_do_not_write_into_one_folder(tmp_path):

@@ -11,9 +11,8 @@ from graph import Graph, weights_of
 from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_msgs.srv import ApplyRho
 from keepaway_transfer.mapping import rho_mapping
-from keepaway_transfer.nodes.transfer import Transfer
-from keepaway_transfer.rho import Transfer as Settings
-from keepaway_transfer.rho import transferred
+from keepaway_transfer.nodes.transfer import TransferNode
+from keepaway_transfer.rho import Transfer, transferred
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def source(tmp_path: Path) -> Path:
 @pytest.fixture
 def ask(graph: Graph, source: Path) -> Callable[..., Any]:
     """Call the node's service, by default for rho from the source to 4v3."""
-    graph.add(Transfer(context=graph.context))
+    graph.add(TransferNode(context=graph.context))
 
     def call(**request: object) -> Any:
         wish = {"source_path": str(source), "target_task": "4v3", **request}
@@ -41,7 +40,7 @@ def ask(graph: Graph, source: Path) -> Callable[..., Any]:
 def test_it_writes_what_rho_gives(ask: Callable[..., Any], source: Path, variant: str) -> None:
     done = ask(variant=variant, seed=3)
     assert done.success, done.message
-    expected = transferred(load_weights(source), Settings("4v3", variant, seed=3))
+    expected = transferred(load_weights(source), Transfer("4v3", variant, seed=3))
     written = load_weights(Path(done.target_path))
     np.testing.assert_array_equal(written.values, expected.values)
     assert (written.task, written.episodes) == ("4v3", 100)

@@ -10,7 +10,7 @@ from scipy import stats
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.reports.summary import measure_trials, summarise
-from keepaway_transfer.studies.results import Results, SourceRun, Trial, record_of
+from keepaway_transfer.studies.results import Results, SourceRun, StudyTrial, record_of
 from keepaway_transfer.studies.study import Row, Stage, Study
 
 HOUR = 36_000  # [cycles]
@@ -32,7 +32,7 @@ def trial(row, number, hours, *, reaches=True, source_hours=0.0):
     halves = int(hours * 2) - 2
     rising = (HOUR // 2, HOUR // 2) if reaches else (9000, 9000, 9000, 9000)
     cycles = (9000, 9000) * halves + rising  # quarters of an hour are 900 s, halves 1800 s
-    return Trial(row, number, sources, cycles, (80, 100), "v1")
+    return StudyTrial(row, number, sources, cycles, (80, 100), "v1")
 
 
 def results(*trials, study=STUDY):
@@ -144,7 +144,7 @@ def test_trials_without_a_partner_are_no_pairs():
 
 def test_the_jumpstart_takes_neither_rows_mean_as_known():
     def starting(row, number, cycles):
-        return Trial(row, number, (), (cycles, *(HOUR // 2,) * 4), (), "v1")
+        return StudyTrial(row, number, (), (cycles, *(HOUR // 2,) * 4), (), "v1")
 
     scratch, after = [9000, 9400, 9600], [12000, 12800, 12600]
     trials = [starting("0", k, cycles) for k, cycles in enumerate(scratch)]

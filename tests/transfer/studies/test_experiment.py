@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keepaway_transfer.studies.experiment import Progress, plan, run
-from keepaway_transfer.studies.results import Trial, open_results, read_trials
+from keepaway_transfer.studies.experiment import StudyProgress, plan, run
+from keepaway_transfer.studies.results import StudyTrial, open_results, read_trials
 from keepaway_transfer.studies.study import load_study
 
 TINY = load_study("tiny")
@@ -19,7 +19,7 @@ KEYS = [(row.name, number) for row in TINY.rows for number in range(TINY.trials)
 
 def play(study, keys):
     """Trials as if they were played: their episodes tell which they are."""
-    return [Trial(row, number, (), (len(row), number), (), "v1") for row, number in keys]
+    return [StudyTrial(row, number, (), (len(row), number), (), "v1") for row, number in keys]
 
 
 class Power:
@@ -75,7 +75,7 @@ def test_a_run_that_was_interrupted_goes_on_and_repeats_nothing(tmp_path):
 
 
 def test_a_run_keeps_no_trial_that_is_on_the_disk(tmp_path):
-    kept: list[weakref.ref[Trial]] = []
+    kept: list[weakref.ref[StudyTrial]] = []
 
     def remembered(study, keys):
         trials = play(study, keys)
@@ -105,7 +105,7 @@ def test_more_trials_are_added_to_a_study_that_is_done(tmp_path):
 
 def test_progress_knows_the_time_left_by_the_work_that_was_done():
     now = 100.0
-    progress = Progress(TINY, done=KEYS[:4], clock=lambda: now)
+    progress = StudyProgress(TINY, done=KEYS[:4], clock=lambda: now)
     assert str(progress) == "4/12 trials, time left unknown"
     for trial in play(TINY, KEYS[4:8]):  # half of what is left, bar four episodes of 12,000
         progress.add(trial)

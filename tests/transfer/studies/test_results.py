@@ -10,7 +10,7 @@ from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.records import block_of, read_records
 from keepaway_transfer.studies.results import (
     SourceRun,
-    Trial,
+    StudyTrial,
     open_results,
     pack,
     read_results,
@@ -24,7 +24,7 @@ STUDY = load_study("tiny")
 
 def trial(number, row="4"):
     source = SourceRun("2v1", 4, 321, keeper=1)
-    return Trial(row, number, (source,), (12, 34), (56,), "0.1.0+gabc")
+    return StudyTrial(row, number, (source,), (12, 34), (56,), "0.1.0+gabc")
 
 
 def opened(folder, study=STUDY, code_version="0.1.0+gabc", **options):
@@ -154,7 +154,7 @@ def test_packing_again_gives_the_same_bytes(tmp_path):
 def test_a_record_keeps_blocks_and_the_first_and_last_episodes(tmp_path):
     study = dataclasses.replace(STUDY, window=1000, threshold=9.0)
     cycles = tuple(range(10, 2000))
-    record = record_of(Trial("0", 0, (), cycles, (50, 70), "v1"), study)
+    record = record_of(StudyTrial("0", 0, (), cycles, (50, 70), "v1"), study)
     assert (record.block, len(record.blocks)) == (
         50,
         39,

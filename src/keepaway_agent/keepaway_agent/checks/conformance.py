@@ -43,7 +43,7 @@ CHAPTERS: Final = {
 """The parts of the script, each of which puts one sentence to the test."""
 
 
-class Match(NamedTuple):
+class ScriptedMatch(NamedTuple):
     """A new match is announced; the agent has to say that it is ready."""
 
     num_keepers: int
@@ -91,7 +91,7 @@ class Pause(NamedTuple):
     seconds: float
 
 
-Step = Match | Shown | Garbage | Pause
+Step = ScriptedMatch | Shown | Garbage | Pause
 
 
 class Request(NamedTuple):
@@ -127,7 +127,7 @@ def script(name: str, seed: int = 0, one_size: bool = False) -> Iterator[Step]:
         AgentError: a name that no player of 3v2 has.
     """
     rng = np.random.default_rng(seed)
-    first = Match(3, 2)
+    first = ScriptedMatch(3, 2)
     if name not in first.player_names:
         raise AgentError(f"{name!r}: choose one of {', '.join(first.player_names)}")
     yield first
@@ -149,7 +149,7 @@ def script(name: str, seed: int = 0, one_size: bool = False) -> Iterator[Step]:
         yield from scenes.episode("clock", 8)
     yield from _garbage(scenes, rng)
     yield from scenes.episode("garbage", 10)
-    for chapter, match in (("new match", first), ("new size", Match(4, 3))):
+    for chapter, match in (("new match", first), ("new size", ScriptedMatch(4, 3))):
         if match is first or not one_size:
             yield match
             scenes = _Scenes(match, match.player_names.index(name), rng)
@@ -159,7 +159,7 @@ def script(name: str, seed: int = 0, one_size: bool = False) -> Iterator[Step]:
 class _Scenes:
     """Episodes as one player may perceive them: everybody wanders about."""
 
-    def __init__(self, match: Match, player: int, rng: np.random.Generator) -> None:
+    def __init__(self, match: ScriptedMatch, player: int, rng: np.random.Generator) -> None:
         self.now = 0.0  # [s] simulated
         self.num_players = len(match.player_names)
         self._match, self._player, self._rng, self._number = match, player, rng, 0

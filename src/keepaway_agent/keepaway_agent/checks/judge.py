@@ -17,8 +17,8 @@ from keepaway_agent.checks.conformance import (
     MOST_ACTION_VALUES,
     READY,
     Exchange,
-    Match,
     Pause,
+    ScriptedMatch,
     Shown,
 )
 
@@ -56,7 +56,7 @@ def judge(log: Sequence[Exchange], name: str, exit_code: int | None) -> list[Ver
         name: of the player.
         exit_code: with which the agent ended when told to; None: it did not, and was killed.
     """
-    said = [each.ready for each in log if isinstance(each.step, Match)]
+    said = [each.ready for each in log if isinstance(each.step, ScriptedMatch)]
     left = "did not end and was killed" if exit_code is None else f"exit code {exit_code}"
     return [
         Verdict(
@@ -120,7 +120,7 @@ def _judge_requests(log: Sequence[Exchange], name: str) -> Verdict:
     wrong: list[str] = []
     total, index, moments = 0, -1, set[tuple[int, int]]()
     for each in log:
-        if isinstance(each.step, Match):
+        if isinstance(each.step, ScriptedMatch):
             index, moments = each.step.player_names.index(name), set()
         elif isinstance(each.step, Shown) and each.step.due:
             moments.add(each.step.moment)
@@ -139,7 +139,7 @@ def _judge_legality(log: Sequence[Exchange]) -> Verdict:
     wrong: list[str] = []
     total, num_keepers = 0, 0
     for each in log:
-        if isinstance(each.step, Match):
+        if isinstance(each.step, ScriptedMatch):
             num_keepers = each.step.num_keepers
         for request in filter(None, each.requests):
             total += 1

@@ -19,7 +19,7 @@ from keepaway_agent.fidelity.trajectories import Trajectories, process_statistic
 from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.training import Training
-from keepaway_agent.training.workers import play
+from keepaway_agent.training.workers import play_trials
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_sim.world.state import DASH, KICK, TURN
@@ -120,7 +120,7 @@ def training(cell: Cell, episodes: int) -> Training:
 def measure(cell: Cell, episodes: int, num_fields: int = 64) -> Measured:
     """Play a cell for at least so many episodes, as many on every field."""
     trials = training(cell, math.ceil(episodes / num_fields))
-    results = list(play(trials, range(num_fields), num_fields=num_fields))
+    results = list(play_trials(trials, range(num_fields), num_fields=num_fields))
     cycles = np.concatenate([result.durations for result in results])
     outcomes = np.concatenate([result.outcomes for result in results])
     return Measured(cell, cycles * CYCLE_TIME, float(np.mean(outcomes == Outcome.OUT_OF_BOUNDS)))
@@ -129,7 +129,7 @@ def measure(cell: Cell, episodes: int, num_fields: int = 64) -> Measured:
 def record(cell: Cell, episodes: int, num_fields: int = 64) -> Trajectories:
     """True positions of a cell's episodes; like the reference's without their last cycle."""
     trials = training(cell, math.ceil(episodes / num_fields))
-    recorder = Recorder(num_fields)
+    recorder = TrajectoryRecorder(num_fields)
     trainer = Trainer(trials.trainer, num_fields)
     for _ in trainer.run((trials.trial(k, None) for k in range(num_fields)), watch_cycle=recorder):
         pass
@@ -148,13 +148,13 @@ def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
         seed=SEED,
         learner=LearnerConfig(ordering="k1", tile_widths="framework"),
     )
-    durations = {r.trial.label: r.durations for r in play(trials, range(num_trials))}
+    durations = {r.trial.label: r.durations for r in play_trials(trials, range(num_trials))}
     played = np.stack([durations[number] for number in range(num_trials)])
     blocks = played[:, : episodes // BLOCK * BLOCK].reshape(num_trials, -1, BLOCK)
     return np.asarray(blocks.mean(axis=2) * CYCLE_TIME)
 
 
-class Recorder:
+class TrajectoryRecorder:
     """Keeps the true positions of all episodes of a world, cycle by cycle."""
 
     def __init__(self, num_fields: int) -> None:

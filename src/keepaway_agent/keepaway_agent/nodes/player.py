@@ -42,7 +42,7 @@ LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 
 
-class Player(Node):
+class PlayerNode(Node):
     """One player of a match, alive before and after it.
 
     Attributes:
@@ -253,7 +253,7 @@ def main(role: Role, args: list[str] | None = None) -> None:
         signal.signal(number, lambda signum, _: told.append(signum))
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        player = Player(role)
+        player = PlayerNode(role)
         executor = EventsExecutor()  # the quick one
         executor.add_node(player)
         gc.freeze()  # what has been imported and compiled stays: no collection looks at it again

@@ -61,7 +61,7 @@ class ScriptedSimulator(Node):
         self._spin, self._is_there, self._patience = spin, is_there, patience
         for step in steps:
             self.log.append(Exchange(step))
-            if isinstance(step, conformance.Match):
+            if isinstance(step, conformance.ScriptedMatch):
                 self._announce(step)
             elif isinstance(step, Shown):
                 self._show(step)
@@ -71,7 +71,7 @@ class ScriptedSimulator(Node):
             elif isinstance(step, Pause):
                 self._listen(step.seconds)
 
-    def _announce(self, match: conformance.Match) -> None:
+    def _announce(self, match: conformance.ScriptedMatch) -> None:
         self._ready_as = -1
         self._match.publish(match_message(match))
         index = match.player_names.index(self._name)
@@ -115,7 +115,7 @@ class ScriptedSimulator(Node):
             self._ready_as = status.player_index
 
 
-def match_message(match: conformance.Match) -> Match:
+def match_message(match: conformance.ScriptedMatch) -> Match:
     """What is played, as a message."""
     return Match(
         task=f"{match.num_keepers}v{match.num_takers}",

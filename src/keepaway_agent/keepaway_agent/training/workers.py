@@ -32,7 +32,7 @@ Assigned = tuple[int, TrialRecorder | None]
 log = logging.getLogger(__name__)
 
 
-def play(
+def play_trials(
     training: Training,
     numbers: Sequence[int],
     processes: int = 1,

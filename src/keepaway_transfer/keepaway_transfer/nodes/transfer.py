@@ -20,13 +20,12 @@ from keepaway_agent.texts import one_line
 from keepaway_msgs.srv import ApplyRho
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.mapping import load_mapping
-from keepaway_transfer.rho import Transfer as Settings
-from keepaway_transfer.rho import transferred
+from keepaway_transfer.rho import Transfer, transferred
 
 PATIENCE = 0.25  # [s] at most, from being told to end to ending
 
 
-class Transfer(Node):
+class TransferNode(Node):
     """Answers `transfer/apply` (keepaway_msgs/ApplyRho)."""
 
     def __init__(self, **node_options: Any) -> None:
@@ -60,7 +59,7 @@ def apply(request: ApplyRho.Request) -> tuple[str, str]:
     mapping = load_mapping(request.mapping_path) if request.mapping_path else None
     variant = request.variant or "rho"
     known = load_weights(source)
-    settings = Settings(request.target_task, variant, mapping, request.seed)
+    settings = Transfer(request.target_task, variant, mapping, request.seed)
     carried = dataclasses.replace(
         transferred(known, settings), created_by=one_line(f"transfer node: {variant} of {source}")
     )
@@ -77,7 +76,7 @@ def main(args: list[str] | None = None) -> None:
         signal.signal(number, lambda signum, _: told.append(signum))
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor()
-    executor.add_node(Transfer())
+    executor.add_node(TransferNode())
     while not told:
         executor.spin_once(timeout_sec=PATIENCE)
     rclpy.try_shutdown()

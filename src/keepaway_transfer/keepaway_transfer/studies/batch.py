@@ -21,14 +21,13 @@ import numpy as np
 from keepaway_agent.actions import Role
 from keepaway_agent.settings import changed
 from keepaway_agent.training.trainer import Trainer
-from keepaway_agent.training.trial import StopRule, TrainerConfig, TrialResult
-from keepaway_agent.training.trial import Trial as Run
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialResult
 from keepaway_sim.version import code_version
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer.metrics import SECONDS_PER_HOUR
 from keepaway_transfer.rho import Transfer, rho
 from keepaway_transfer.studies.experiment import Key
-from keepaway_transfer.studies.results import SourceRun, Trial
+from keepaway_transfer.studies.results import SourceRun, StudyTrial
 from keepaway_transfer.studies.study import Row, Study
 from keepaway_transfer.variants import constant, variant_of
 
@@ -37,7 +36,7 @@ GREEDY, CHOICE, SHUFFLE, TARGET = 100, 101, 102, 103  # seeds of what is no sour
 
 
 @dataclass
-class _Life:
+class _TrialState:
     """A trial while it is played."""
 
     row: Row
@@ -49,25 +48,27 @@ class _Life:
     greedy_cycles: tuple[int, ...] = ()
 
 
-def play(study: Study, keys: Sequence[Key]) -> list[Trial]:
+def play_batch(study: Study, keys: Sequence[Key]) -> list[StudyTrial]:
     """Play these trials to their end; the results are in the order of the keys."""
     rows = {row.name: row for row in study.rows}
-    lives = [_Life(rows[name], number, _constant(study, rows[name])) for name, number in keys]
-    for stage in range(max((len(life.row.stages) for life in lives), default=0)):
-        _train_sources(study, [x for x in lives if len(x.row.stages) > stage], stage)
-    _train_target(study, lives)
+    states = [
+        _TrialState(rows[name], number, _constant(study, rows[name])) for name, number in keys
+    ]
+    for stage in range(max((len(state.row.stages) for state in states), default=0)):
+        _train_sources(study, [x for x in states if len(x.row.stages) > stage], stage)
+    _train_target(study, states)
     if study.greedy_episodes:
-        _play_greedily(study, lives)
+        _play_greedily(study, states)
     return [
-        Trial(
-            row=life.row.name,
-            number=life.number,
-            sources=tuple(life.sources),
-            cycles=life.cycles,
-            greedy_cycles=life.greedy_cycles,
+        StudyTrial(
+            row=state.row.name,
+            number=state.number,
+            sources=tuple(state.sources),
+            cycles=state.cycles,
+            greedy_cycles=state.greedy_cycles,
             code_version=code_version(),
         )
-        for life in lives
+        for state in states
     ]
 
 
@@ -80,54 +81,54 @@ def _constant(study: Study, row: Row) -> np.ndarray | None:
     return None if level is None else constant(level, shape)
 
 
-def _train_sources(study: Study, lives: Sequence[_Life], stage: int) -> None:
-    """Train a source stage of all lives, and carry what was learned to their next task."""
-    by_run: dict[tuple[str, str, str, int], list[_Life]] = defaultdict(list)
-    for life in lives:
-        task, name = life.row.stages[stage].task, study.source_name(life.row, stage)
-        by_run[task, life.row.widths, name, life.number].append(life)
-    runs: dict[tuple[str, str], list[Run]] = defaultdict(list)
+def _train_sources(study: Study, states: Sequence[_TrialState], stage: int) -> None:
+    """Train a source stage of all states, and carry what was learned to their next task."""
+    by_run: dict[tuple[str, str, str, int], list[_TrialState]] = defaultdict(list)
+    for state in states:
+        task, name = state.row.stages[stage].task, study.source_name(state.row, stage)
+        by_run[task, state.row.widths, name, state.number].append(state)
+    runs: dict[tuple[str, str], list[Trial]] = defaultdict(list)
     for label, sharing in by_run.items():
         runs[label[:2]].append(_source_run(study, label, sharing, stage))
     for (task, widths), alike in runs.items():
         for result in Trainer(_config(study, task, widths), len(alike)).run(alike):
-            for life in by_run[result.trial.label]:
-                _carry(study, life, stage, result)
+            for state in by_run[result.trial.label]:
+                _carry(study, state, stage, result)
 
 
 def _source_run(
-    study: Study, label: tuple[str, str, str, int], lives: Sequence[_Life], stage: int
-) -> Run:
-    """The training that these lives share (or that one has for itself)."""
+    study: Study, label: tuple[str, str, str, int], states: Sequence[_TrialState], stage: int
+) -> Trial:
+    """The training that these states share (or that one has for itself)."""
     *_, name, number = label
-    amounts = {life.row.stages[stage].episodes for life in lives}
-    return Run(
+    amounts = {state.row.stages[stage].episodes for state in states}
+    return Trial(
         seed=_seed(study, name, number, stage),
         stop=StopRule(max_episodes=max(amounts)),
-        keeper_weights=lives[0].weights,
+        keeper_weights=states[0].weights,
         snapshots=tuple(sorted(amounts)),
         label=label,
     )
 
 
-def _carry(study: Study, life: _Life, stage: int, result: TrialResult) -> None:
+def _carry(study: Study, state: _TrialState, stage: int, result: TrialResult) -> None:
     """Let a random keeper's weights, through rho, be what the next task starts with."""
     task, _, name, number = result.trial.label
-    episodes = life.row.stages[stage].episodes
+    episodes = state.row.stages[stage].episodes
     keepers = result.snapshots[episodes]
     choice = np.random.default_rng(_seed(study, name, number, stage, CHOICE))
     keeper = int(choice.integers(len(keepers)))
     cycles = int(result.durations[:episodes].sum())
-    life.sources.append(SourceRun(task, episodes, cycles, keeper))
-    following = [*(later.task for later in life.row.stages[stage + 1 :]), study.target][0]
-    life.weights = _through_rho(study, life, task, following, keepers[keeper])
+    state.sources.append(SourceRun(task, episodes, cycles, keeper))
+    following = [*(later.task for later in state.row.stages[stage + 1 :]), study.target][0]
+    state.weights = _through_rho(study, state, task, following, keepers[keeper])
 
 
 def _through_rho(
-    study: Study, life: _Life, source: str, target: str, weights: np.ndarray
+    study: Study, state: _TrialState, source: str, target: str, weights: np.ndarray
 ) -> np.ndarray:
-    row = life.row
-    shuffle = _seed(study, study.target_name(row), life.number, SHUFFLE).generate_state(1)
+    row = state.row
+    shuffle = _seed(study, study.target_name(row), state.number, SHUFFLE).generate_state(1)
     transfer = Transfer(target, row.variant, seed=int(shuffle[0]))
     return rho(
         weights,
@@ -138,7 +139,7 @@ def _through_rho(
     )
 
 
-def _train_target(study: Study, lives: Sequence[_Life]) -> None:
+def _train_target(study: Study, states: Sequence[_TrialState]) -> None:
     stop = StopRule(
         max_cycles=round(study.max_hours * CYCLES_PER_HOUR),
         threshold=study.threshold,
@@ -146,40 +147,40 @@ def _train_target(study: Study, lives: Sequence[_Life]) -> None:
         min_cycles=round(study.min_hours * CYCLES_PER_HOUR),
     )
     runs = [
-        Run(
-            seed=_seed(study, study.target_name(life.row), life.number, TARGET),
+        Trial(
+            seed=_seed(study, study.target_name(state.row), state.number, TARGET),
             stop=stop,
-            keeper_weights=life.weights,
-            label=life,
+            keeper_weights=state.weights,
+            label=state,
         )
-        for life in lives
+        for state in states
     ]
-    for life, result in _results(study, runs):
-        life.cycles, life.learned = _tuple(result.durations), result.keeper_weights
+    for state, result in _results(study, runs):
+        state.cycles, state.learned = _tuple(result.durations), result.keeper_weights
 
 
-def _play_greedily(study: Study, lives: Sequence[_Life]) -> None:
+def _play_greedily(study: Study, states: Sequence[_TrialState]) -> None:
     """Play on without learning or exploring, up to the target task's limit of hours."""
     stop = StopRule(
         max_episodes=study.greedy_episodes, max_cycles=round(study.max_hours * CYCLES_PER_HOUR)
     )
     runs = [
-        Run(
-            seed=_seed(study, study.target_name(life.row), life.number, GREEDY),
+        Trial(
+            seed=_seed(study, study.target_name(state.row), state.number, GREEDY),
             stop=stop,
             keeper_policy="greedy",
-            keeper_weights=life.learned,
-            label=life,
+            keeper_weights=state.learned,
+            label=state,
         )
-        for life in lives
+        for state in states
     ]
-    for life, result in _results(study, runs):
-        life.greedy_cycles = _tuple(result.durations)
+    for state, result in _results(study, runs):
+        state.greedy_cycles = _tuple(result.durations)
 
 
-def _results(study: Study, runs: Sequence[Run]) -> Iterator[tuple[_Life, TrialResult]]:
-    """Play runs of the target task, all of one tiling at once; each with the life it is of."""
-    by_widths: dict[str, list[Run]] = defaultdict(list)
+def _results(study: Study, runs: Sequence[Trial]) -> Iterator[tuple[_TrialState, TrialResult]]:
+    """Play runs of the target task, all of one tiling at once; each with the state it is of."""
+    by_widths: dict[str, list[Trial]] = defaultdict(list)
     for run in runs:
         by_widths[run.label.row.widths].append(run)
     for widths, alike in by_widths.items():

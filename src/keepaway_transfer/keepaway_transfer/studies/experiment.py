@@ -1,6 +1,6 @@
 """Running a study: which trials are left, and any executor to play them on.
 
-Trials are played in batches (`batch.play`), one batch a task of a `concurrent.futures.Executor`:
+Trials are played in batches (`batch.play_batch`), each a task of a `concurrent.futures.Executor`:
 processes on this machine, or a cluster's through its own executor (Dask's `Client.get_executor`).
 A trial gives the same whatever batch it is in, so a run can be stopped and gone on with anywhere.
 """
@@ -10,11 +10,11 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext
 
-from keepaway_transfer.studies.results import ResultsFolder, Trial
+from keepaway_transfer.studies.results import ResultsFolder, StudyTrial
 from keepaway_transfer.studies.study import Study
 
 Key = tuple[str, int]  # a row's name and a trial's number
-Play = Callable[[Study, Sequence[Key]], list[Trial]]
+Play = Callable[[Study, Sequence[Key]], list[StudyTrial]]
 
 TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
 
@@ -54,7 +54,7 @@ def run(
     play: Play,
     batch: int,
     shield: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> Iterator[Trial]:
+) -> Iterator[StudyTrial]:
     """Play the trials that are left and yield each once it is on the disk.
 
     Stopping the iteration gives up the batches that were not begun. A batch that has been played is
@@ -78,11 +78,11 @@ def run(
             future.cancel()
 
 
-def _failed(future: Future[list[Trial]]) -> bool:
+def _failed(future: Future[list[StudyTrial]]) -> bool:
     return future.exception() is not None
 
 
-class Progress:
+class StudyProgress:
     """How much of a study is done and how long the rest will take at the same rate.
 
     A trial weighs as many episodes as it may be expected to play.
@@ -101,7 +101,7 @@ class Progress:
         self._played = 0
         self._clock, self._start = clock, clock()
 
-    def add(self, trial: Trial) -> None:
+    def add(self, trial: StudyTrial) -> None:
         """Count a trial that was played."""
         weight = self._weights[trial.row]
         self.done += 1

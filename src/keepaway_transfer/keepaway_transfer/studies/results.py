@@ -48,7 +48,7 @@ class SourceRun:
 
 
 @dataclass(frozen=True)
-class Trial:
+class StudyTrial:
     """One trial as it was played; every measure is worked out from it later."""
 
     row: str
@@ -75,7 +75,7 @@ class Results:
     note: str = ""  # what else must be known of them
 
 
-def record_of(trial: Trial, study: Study) -> Record:
+def record_of(trial: StudyTrial, study: Study) -> Record:
     """What is kept of a trial of this study."""
     cycles = sum(run.cycles for run in trial.sources)
     return Record(
@@ -109,7 +109,7 @@ def read_results(folder: Path | str) -> Results:
     return Results(study, *about, (*packed, *fresh), str(head.get("note", "")))
 
 
-def read_trials(folder: Path | str) -> Iterator[Trial]:
+def read_trials(folder: Path | str) -> Iterator[StudyTrial]:
     """The trials of `trials.jsonl`, each once with all its episodes; none if it is not there.
 
     Raises:
@@ -150,7 +150,7 @@ class ResultsFolder:
         self._file = file
         self.done = done  # keys of the trials that were there when it was opened
 
-    def append(self, trial: Trial) -> None:
+    def append(self, trial: StudyTrial) -> None:
         """Add a trial and wait until it is on the disk."""
         self._file.write(json.dumps(asdict(trial), separators=(",", ":"), allow_nan=False) + "\n")
         self._file.flush()
@@ -233,12 +233,12 @@ def _read_packed(folder: Path) -> tuple[Record, ...]:
     return read_records(path) if path.exists() else ()
 
 
-def _trial_from(line: str, where: str) -> Trial:
+def _trial_from(line: str, where: str) -> StudyTrial:
     try:
         data = json.loads(line)
         data["sources"] = tuple(SourceRun(**source) for source in data["sources"])
         data["cycles"], data["greedy_cycles"] = tuple(data["cycles"]), tuple(data["greedy_cycles"])
-        return Trial(**data)
+        return StudyTrial(**data)
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise StudyError(f"{where}: {error}") from error
 
