@@ -3,7 +3,7 @@
     .venv/bin/python scripts/analyze.py results/table2
     .venv/bin/python scripts/analyze.py results/table2 --threshold 8 --out results/table2-at-8
     .venv/bin/python scripts/analyze.py out/bag
-    .venv/bin/python scripts/analyze.py log.kwy --threshold 9
+    .venv/bin/python scripts/analyze.py first.kwy second.kwy --threshold 9
 
 The report is written beside the results if no other folder is named; a bag's to BAG/analysis. Of a
 bag it has a line for every episode (CSV and Parquet), hold times, passes, losses and actions.
@@ -14,12 +14,14 @@ import signal
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from keepaway_sim.analysis.report import analyse
 from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer import metrics
-from keepaway_transfer.errors import TransferError
-from keepaway_transfer.reports.kwy import read_kwy
+from keepaway_transfer.errors import LogError, TransferError
+from keepaway_transfer.reports.kwy import KeepawayLog, read_kwy
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.studies.results import pack, read_results
 
@@ -29,15 +31,18 @@ def main() -> int:
     arguments = _parse()
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `analyze.py BAG | head` ends quietly
     try:
-        if arguments.results.suffix == ".kwy":
-            print(_log_line(arguments.results, arguments.threshold or 9.0, arguments.window))
+        if all(path.suffix == ".kwy" for path in arguments.results):
+            print(_logs_line(arguments.results, arguments.threshold or 9.0, arguments.window))
             return 0
-        if is_bag(arguments.results) or arguments.results.is_file():
-            return _analyse_bag(arguments.results, arguments.out, arguments.match)
-        results = read_results(arguments.results)
-        out = arguments.out or arguments.results
+        if len(arguments.results) > 1:
+            raise KeepawayError("name one folder or bag, or several .kwy logs of one training")
+        path = arguments.results[0]
+        if is_bag(path) or path.is_file():
+            return _analyse_bag(path, arguments.out, arguments.match)
+        results = read_results(path)
+        out = arguments.out or path
         print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
-        pack(arguments.results, out)
+        pack(path, out)
     except (TransferError, KeepawayError, FileNotFoundError) as error:
         print(f"analyze: {error}", file=sys.stderr)
         return 1
@@ -52,15 +57,30 @@ def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
     return 0
 
 
-def _log_line(path: Path, threshold: float, window: int) -> str:
-    log = read_kwy(path)
-    crossing = metrics.time_to_threshold(log.durations, threshold, window)
-    played = f"{len(log.cycles):,} episodes of {log.num_keepers}v{log.num_takers}"
-    hours = f"{metrics.hours(log.durations):.1f} simulated hours"
+def _logs_line(paths: list[Path], threshold: float, window: int) -> str:
+    """What the logs of one training tell, taken together in their order."""
+    logs = [read_kwy(path) for path in paths]
+    first = logs[0]
+    for path, log in zip(paths, logs, strict=True):
+        if _match_of(log) != _match_of(first):
+            raise LogError(f"{path} is of another task or field than {paths[0]}")
+    durations = np.concatenate([log.durations for log in logs])
+    out = np.concatenate([log.out_of_bounds for log in logs])
+    task = f"{first.num_keepers}v{first.num_takers}"
+    length, width = first.field_size
+    if not len(durations):
+        return f"no episode of {task} on {length:g} x {width:g} m."
+    crossing = metrics.time_to_threshold(durations, threshold, window)
+    played = f"{len(durations):,} episodes of {task} on {length:g} x {width:g} m"
+    hours = f"{metrics.hours(durations):.1f} simulated hours"
+    ended = f"held {durations.mean():.2f} s on average, {out.mean():.0%} ended out of bounds"
     goal = f"a mean of {threshold:g} s over {window:,} episodes"
-    if not crossing.reached:
-        return f"{played}, {hours}: never {goal}."
-    return f"{played}, {hours}: {goal} at episode {crossing.episodes:,}, {crossing.hours:.2f} h."
+    when = f"at episode {crossing.episodes:,}, {crossing.hours:.2f} h" if crossing.reached else ""
+    return f"{played}, {hours}: {ended}; {goal} {when or 'was never reached'}."
+
+
+def _match_of(log: KeepawayLog) -> tuple[object, ...]:
+    return log.num_keepers, log.num_takers, log.field_size
 
 
 def _parse() -> argparse.Namespace:
@@ -68,7 +88,10 @@ def _parse() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "results", type=Path, help="folder of scripts/study.py, a bag, or a .kwy log"
+        "results",
+        type=Path,
+        nargs="+",
+        help="folder of scripts/study.py, a bag, or .kwy logs of one training in their order",
     )
     parser.add_argument("--threshold", type=float, help="mean duration [s]; default the study's")
     parser.add_argument("--window", type=int, default=metrics.WINDOW, help="episodes; for a log")

@@ -56,9 +56,30 @@ def test_a_log_is_told_when_it_reached_the_threshold(tmp_path):
     write_kwy(log, cycles, [False] * 40, num_keepers=3, num_takers=2, field_size=(20, 20))
     done = analyze(log, "--threshold", 120, "--window", 2)
     assert done.stdout == (
-        "40 episodes of 3v2, 1.2 simulated hours: a mean of 120 s over 2 episodes"
-        " at episode 37, 1.06 h.\n"
+        "40 episodes of 3v2 on 20 x 20 m, 1.2 simulated hours: held 110.00 s on average, 0% ended"
+        " out of bounds; a mean of 120 s over 2 episodes at episode 37, 1.06 h.\n"
     )
+
+
+def test_several_logs_of_a_training_are_one_in_their_order(tmp_path):
+    size = {"num_keepers": 3, "num_takers": 2, "field_size": (20, 20)}
+    write_kwy(tmp_path / "1.kwy", [1000] * 36, [True] * 36, **size)
+    write_kwy(tmp_path / "2.kwy", [2000] * 4, [False] * 4, **size)
+    write_kwy(tmp_path / "3.kwy", [10], [False], **(size | {"num_keepers": 4}))
+    logs = [tmp_path / f"{number}.kwy" for number in (1, 2, 3)]
+    done = analyze(*logs[:2], "--threshold", 120, "--window", 2)
+    assert "40 episodes of 3v2 on 20 x 20 m" in done.stdout
+    assert "90% ended out of bounds" in done.stdout
+    assert "at episode 37" in done.stdout
+    assert "was never reached" in analyze(*logs[:2], "--threshold", 300).stdout
+    assert "another task or field" in analyze(*logs).stderr
+
+
+def test_a_plain_file_is_no_bag(tmp_path):
+    (tmp_path / "notes.txt").write_text("nothing")
+    done = analyze(tmp_path / "notes.txt")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.endswith("notes.txt is no MCAP file\n")
 
 
 def test_a_folder_without_results_is_refused_in_one_line(tmp_path):

@@ -38,6 +38,8 @@ MAX_RATIO = 100
 """Unpacked over packed size of a whole file; matches have 3 to 5."""
 FREE_SIZE = 2**26  # [bytes] that a file may unpack to, however small it is
 MAGIC = b"\x89MCAP0\r\n"
+_LEAST_MESSAGE = 4  # [bytes] packed; messages of matches have 30 and more
+_FREE_MESSAGES = 2000  # that chunks may have, however small they are
 _ZSTD_MAGIC = int.from_bytes(b"\x28\xb5\x2f\xfd", "little")
 _FREE_MESSAGE = 4096  # [bytes] that messages packed by themselves may unpack to
 
@@ -114,6 +116,12 @@ class McapFile:
                 raise KeepawayError(f"the chunk at {run.chunks[0].offset} is damaged")
             for opcode, first, last in definitions.tolist():
                 self._read_definition(opcode, data[first:last])
+            packed = sum(chunk.length for chunk in run.chunks)
+            if len(messages) > _FREE_MESSAGES + packed // _LEAST_MESSAGE:
+                raise KeepawayError(
+                    f"{len(messages):,} messages are packed into {packed:,} bytes; if you trust it,"
+                    " unpack it first: mcap decompress"
+                )
             self._check_messages(run, messages)
             return self._unpacked_messages(data, messages)
 

@@ -17,6 +17,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire import cdr
 
 _MOST_FILES = 10_000
+_ROWS_AT_ONCE = 10_000
 
 
 class Place(NamedTuple):
@@ -198,7 +199,7 @@ class BagReader:
         """The same, message by message."""
         names = [(topic.name, topic.message_type) for topic in self._kinds]
         for data, rows, _ in self.blocks(topics, start, end, chosen):
-            for number, log_time, first, last in rows.tolist():
+            for number, log_time, first, last in each(rows):
                 name, message_type = names[number]
                 yield Recorded(name, message_type, log_time, data[first:last])
 
@@ -290,3 +291,9 @@ def _runs_of_equal_size(index: np.ndarray) -> list[np.ndarray]:
     """Split rows (channel, time, first, last) where the number of bytes changes."""
     sizes = index[:, 3] - index[:, 2]
     return np.split(index, np.flatnonzero(np.diff(sizes)) + 1)
+
+
+def each(rows: np.ndarray) -> Iterator[list[int]]:
+    """Rows one by one, as whole numbers."""
+    for first in range(0, len(rows), _ROWS_AT_ONCE):
+        yield from rows[first : first + _ROWS_AT_ONCE].tolist()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.bags.reader import BagReader, each
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 
@@ -30,7 +30,7 @@ def repair(path: Path | str, output: Path | str) -> BagReader:
         for name, data in broken.attachments():
             whole.attach(name, data)
         for data, rows, _ in broken.stored():
-            for number, time, first, last in rows.tolist():
+            for number, time, first, last in each(rows):
                 kind = broken.kinds[number]
                 if kind.message_type != broken.topics[kind.name].message_type:
                     left_out[kind.name] = left_out.get(kind.name, 0) + 1

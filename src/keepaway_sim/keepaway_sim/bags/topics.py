@@ -15,7 +15,7 @@ INFO = "keepaway"
 
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}  # how rosbag2 writes an infinite duration
-_LATCHED = {MATCH: 1, AGENT_STATUS: 1, EPISODE: 10}  # their depths
+_LATCHED = {MATCH: 1, AGENT_STATUS: 1, EPISODE: 1000}  # their depths
 _LONGEST_QOS = 8192  # [bytes] of a topic's offers that are read; some 20 publishers
 
 

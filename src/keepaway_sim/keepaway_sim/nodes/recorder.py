@@ -165,8 +165,11 @@ class Recorder(Node):
         topic = self.resolve_topic_name(name)
         if topic in self._subscriptions_by_topic:
             return
-        qos = to_profile(default_qos(message_type), self.settings.history)
-        subscription = listen(self, topic, message_type, qos)
+        qos = default_qos(message_type)
+        if message_type == EPISODE:  # older bags offer it volatile, and what was before is over
+            qos = qos._replace(transient_local=False)
+        profile = to_profile(qos, self.settings.history)
+        subscription = listen(self, topic, message_type, profile)
         self._subscriptions_by_topic[topic] = message_type, subscription
 
     def _record(self, topic: str, message_type: str, data: bytes) -> None:
