@@ -62,10 +62,12 @@ def test_a_log_is_told_when_it_reached_the_threshold(tmp_path):
 
 
 def test_several_logs_of_a_training_are_one_in_their_order(tmp_path):
-    size = {"num_keepers": 3, "num_takers": 2, "field_size": (20, 20)}
-    write_kwy(tmp_path / "1.kwy", [1000] * 36, [True] * 36, **size)
-    write_kwy(tmp_path / "2.kwy", [2000] * 4, [False] * 4, **size)
-    write_kwy(tmp_path / "3.kwy", [10], [False], **(size | {"num_keepers": 4}))
+    played = [([1000] * 36, True, 3), ([2000] * 4, False, 3), ([10], False, 4)]
+    for number, (cycles, out, keepers) in enumerate(played, start=1):
+        write_kwy(
+            tmp_path / f"{number}.kwy", cycles, [out] * len(cycles),
+            num_keepers=keepers, num_takers=2, field_size=(20, 20),
+        )  # fmt: skip
     logs = [tmp_path / f"{number}.kwy" for number in (1, 2, 3)]
     done = analyze(*logs[:2], "--threshold", 120, "--window", 2)
     assert "40 episodes of 3v2 on 20 x 20 m" in done.stdout
