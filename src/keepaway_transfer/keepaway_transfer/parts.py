@@ -82,6 +82,13 @@ def sample_of(task: str, tiling: Tiling) -> Sample:
         return np.array([state_cells(state, tiling) for state in drawn[task]])
 
 
+@cache
+def has_sample(task: str) -> bool:
+    """Were states of this task drawn?"""
+    with np.load(STATES_FILE) as drawn:
+        return task in drawn
+
+
 def split(weights: Weights, sample: Sample) -> Split:
     """The three parts of weights, (num_actions, num_features, num_tiles, num_tilings)."""
     level = _mean_weight(weights, sample)

@@ -159,7 +159,7 @@ def test_the_jumpstart_takes_neither_rows_mean_as_known():
 def test_the_report_has_a_table_and_figures(worked, tmp_path):
     text = write_report(worked, tmp_path)
     assert (tmp_path / "table.md").read_text() == text
-    assert "| 10 | 3 | 3 | 0.50 | 3.50 [" in text
+    assert "| 10 | 3 | 3 | 0.50 | - | 3.50 [" in text
     assert "Made by `scripts/study.py worked`: study worked, seed 3, code v1, 6 trials." in text
     for name in ("learning_curves", "time_to_threshold", "share_reached", "durations"):
         assert imread(tmp_path / f"{name}.png").ndim == 3
@@ -177,7 +177,7 @@ def test_a_threshold_that_the_trials_were_not_run_to_is_refused(worked):
 def test_a_report_of_records_without_episodes_has_no_curves(worked, tmp_path):
     bare = [dataclasses.replace(one, blocks=(), first=(), last=()) for one in worked.records]
     text = write_report(dataclasses.replace(worked, records=tuple(bare), note="Old."), tmp_path)
-    assert "| 10 | 3 | 3 | 0.50 | 3.50 [" in text
+    assert "| 10 | 3 | 3 | 0.50 | - | 3.50 [" in text
     assert text.endswith("6 trials. Old.\n")
     assert {path.stem for path in tmp_path.glob("*.png")} == {"time_to_threshold", "share_reached"}
     with pytest.raises(StudyError, match="only the times to 1000 s are known"):
@@ -204,7 +204,7 @@ def test_a_report_of_few_trials_has_no_comparison_but_a_table(tmp_path):
 
 def test_a_study_of_scratch_alone_has_a_report(tmp_path):
     text = write_report(results(trial("0", 0, 6), trial("0", 1, 7)), tmp_path)
-    assert "| 0 | 2 | 2 | 0.00 | 6.00 [" in text
+    assert "| 0 | 2 | 2 | 0.00 | - | 6.00 [" in text
     assert "Against row" not in text
 
 

@@ -54,6 +54,8 @@ def test_trials_differ_between_rows_and_numbers(trials):
 
 def test_a_trial_says_what_it_trained_on_before(trials):
     assert trials["0", 0].sources == ()
+    assert trials["0", 0].start_level is None
+    assert trials["8", 0].start_level > 0
     (source,) = trials["8", 0].sources
     assert (source.task, source.episodes) == ("2v1", 8)
     assert source.cycles >= 8 * 10  # nobody loses the ball within a second
@@ -124,7 +126,8 @@ def test_shuffled_trials_have_shuffles_of_their_own(runs):
 
 def test_an_optimistic_row_starts_at_a_constant_of_its_level(runs):
     rows = (Row("0"), Row("high", variant="optimistic@5"))
-    play_batch(dataclasses.replace(TINY, rows=rows), [("high", 0)])
+    (trial,) = play_batch(dataclasses.replace(TINY, rows=rows), [("high", 0)])
+    assert trial.start_level == pytest.approx(5.0)
     (weight,) = np.unique(runs[0][1].trial.keeper_weights)
     assert weight * 13 * 32 / 10 == pytest.approx(5.0)  # all active tiles, in seconds
 

@@ -31,13 +31,14 @@ CURVE_POINTS = 400
 def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
     """The rows as Markdown: first what they gave, then how they compare with each reference."""
     lines = [
-        "| row | trials | reached | source hours | target hours | total hours"
+        "| row | trials | reached | source hours | level (s) | target hours | total hours"
         " | first episodes (s) | at the end (s) | greedy (s) | transfer ratio |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         lines.append(
             f"| {row.name} | {row.trials} | {row.reached} | {row.source_hours:.2f}"
+            f" | {_number(row.start_level, '.1f')}"
             f" | {spread(row.target)} | {spread(row.total)} | {spread(row.initial)}"
             f" | {spread(row.asymptotic)} | {spread(row.greedy)}"
             f" | {_number(row.transfer_ratio, '+.3f')} |"
@@ -47,7 +48,8 @@ def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
         f"Hours to a mean duration of {threshold:g} s over {study.window:,} episodes of"
         f" {study.target}; trials that did not reach it within {study.max_hours:g} h count with"
         " that time (restricted mean). In brackets: 95 % intervals (target hours from the"
-        " Kaplan-Meier curve, the others by bootstrap over trials). First episodes: the first"
+        " Kaplan-Meier curve, the others by bootstrap over trials). Level: what actions were worth"
+        " on average when the target task began. First episodes: the first"
         f" {metrics.FIRST_EPISODES}. At the end: the last {study.window:,}, where trials do not"
         " stop at the threshold.",
     ]
@@ -165,8 +167,23 @@ def _figures(
     threshold: float,
 ) -> dict[str, Figure]:
     study = results.study
+    records = {name: [one for one in results.records if one.row == name] for name in drawn}
+    figures = (
+        _time_figures(study, measures, rows, threshold) if any(r.reached for r in rows) else {}
+    )
+    if all(one.has_episodes for row in records.values() for one in row):
+        figures |= _episode_figures(study, records, threshold)
+    return figures
+
+
+def _time_figures(
+    study: Study,
+    measures: Sequence[TrialMeasures],
+    rows: Sequence[RowSummary],
+    threshold: float,
+) -> dict[str, Figure]:
     goal = f"Time to a mean of {threshold:g} s in {study.target}"
-    figures = {
+    return {
         "time_to_threshold": plotting.time_to_threshold(
             [row.name for row in rows],
             [row.target for row in rows],
@@ -178,10 +195,6 @@ def _figures(
         ),
         "share_reached": plotting.share_reached(_reached(measures, rows), study.max_hours, goal),
     }
-    records = {name: [one for one in results.records if one.row == name] for name in drawn}
-    if all(one.has_episodes for row in records.values() for one in row):
-        figures |= _episode_figures(study, records, threshold)
-    return figures
 
 
 def _episode_figures(

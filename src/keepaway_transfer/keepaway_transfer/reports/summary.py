@@ -36,6 +36,7 @@ class TrialMeasures:
     trial: int
     source_episodes: int
     source_hours: float
+    start_level: float  # [s] of the values that the target task began with; NaN if not known
     reached: bool  # the threshold, within the study's limit
     target_episodes: int  # to the threshold or to the limit
     target_hours: float
@@ -69,6 +70,7 @@ class RowSummary:
     trials: int
     reached: int
     source_hours: float  # mean
+    start_level: float  # [s] mean over the trials; NaN if not known
     target: Interval  # hours, restricted mean
     total: Interval
     initial: Interval  # [s]
@@ -216,6 +218,7 @@ def _measures(
         trial=record.number,
         source_episodes=record.source_episodes,
         source_hours=record.source_hours,
+        start_level=record.start_level,
         reached=crossing.reached and crossing.hours <= study.max_hours,
         target_episodes=crossing.episodes,
         target_hours=target_hours,
@@ -305,6 +308,7 @@ def _summary(
         trials=len(trials),
         reached=sum(reached),
         source_hours=float(np.mean(values(trials, "source_hours"))),
+        start_level=float(np.mean(values(trials, "start_level"))),
         target=statistics.restricted_mean(values(trials, "target_hours"), reached, limit),
         total=mean("total_hours"),
         initial=mean("initial_performance"),

@@ -25,6 +25,7 @@ from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, TrialR
 from keepaway_sim.version import code_version
 from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer.metrics import SECONDS_PER_HOUR
+from keepaway_transfer.parts import has_sample, level_of, sample_of
 from keepaway_transfer.rho import Transfer, rho
 from keepaway_transfer.studies.experiment import Key
 from keepaway_transfer.studies.results import SourceRun, StudyTrial
@@ -67,6 +68,7 @@ def play_batch(study: Study, keys: Sequence[Key]) -> list[StudyTrial]:
             cycles=state.cycles,
             greedy_cycles=state.greedy_cycles,
             code_version=code_version(),
+            start_level=_start_level(study, state),
         )
         for state in states
     ]
@@ -79,6 +81,14 @@ def _constant(study: Study, row: Row) -> np.ndarray | None:
     config, level = _config(study, study.target, row.widths), variant_of(row.variant).level
     shape = config.tiling(Role.KEEPER).weights_shape(config.task.num_keepers)
     return None if level is None else constant(level, shape)
+
+
+def _start_level(study: Study, state: _TrialState) -> float | None:
+    """What the target task's actions were worth on average [s], where it is known what that is."""
+    if state.weights is None or not has_sample(study.target):
+        return None
+    tiling = _config(study, study.target, state.row.widths).tiling(Role.KEEPER)
+    return level_of(state.weights, sample_of(study.target, tiling))
 
 
 def _train_sources(study: Study, states: Sequence[_TrialState], stage: int) -> None:

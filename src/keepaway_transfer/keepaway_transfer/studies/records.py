@@ -34,6 +34,7 @@ SCHEMA = pa.schema(
         ("number", pa.uint32()),
         ("source_episodes", pa.uint32()),
         ("source_hours", pa.float64()),
+        ("start_level", pa.float64()),
         ("crossed", pa.bool_()),
         ("crossing_episodes", pa.uint32()),
         ("crossing_hours", pa.float64()),
@@ -60,6 +61,7 @@ class Record:
     number: int  # within the row
     source_episodes: int
     source_hours: float
+    start_level: float  # [s] of the values that the target task began with (`parts`); may be NaN
     crossed: bool  # did the windowed mean pass the study's threshold?
     crossing_episodes: int  # of the target task until then, or all of them
     crossing_hours: float

@@ -12,6 +12,7 @@ A folder with that file is whole without the other, and a study can go on in it.
 import fcntl
 import json
 import logging
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,6 +58,7 @@ class StudyTrial:
     cycles: tuple[int, ...]  # duration of each episode of the target task [cycles of 0.1 s]
     greedy_cycles: tuple[int, ...]  # the same, then played without learning or exploring
     code_version: str
+    start_level: float | None = None  # [s] of the values that the target task began with
 
     @property
     def key(self) -> tuple[str, int]:
@@ -83,6 +85,7 @@ def record_of(trial: StudyTrial, study: Study) -> Record:
         number=trial.number,
         source_episodes=sum(run.episodes for run in trial.sources),
         source_hours=cycles * CYCLE_TIME / metrics.SECONDS_PER_HOUR,
+        start_level=math.nan if trial.start_level is None else trial.start_level,
         code_version=trial.code_version,
         **durations_record(trial.cycles, trial.greedy_cycles, study.threshold, study.window),
     )

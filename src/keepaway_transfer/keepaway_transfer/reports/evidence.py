@@ -1,0 +1,124 @@
+"""Studies side by side: what rows of one study, or of two, differ by."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from keepaway_transfer.errors import StudyError
+from keepaway_transfer.reports.statistics import Comparison
+from keepaway_transfer.reports.summary import (
+    RowSummary,
+    TrialMeasures,
+    compare,
+    measure_trials,
+    summarise,
+)
+from keepaway_transfer.studies.results import STUDY_FILE, Results, read_results
+from keepaway_transfer.studies.study import Row, Study
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The results of one study with all that was worked out of them."""
+
+    results: Results
+
+    @property
+    def study(self) -> Study:
+        """What was run."""
+        return self.results.study
+
+    @property
+    def scratch(self) -> str:
+        """The row that learns from scratch."""
+        return self.study.references[0]
+
+    @cached_property
+    def measures(self) -> list[TrialMeasures]:
+        """Every trial's."""
+        return measure_trials(self.results)
+
+    @cached_property
+    def rows(self) -> dict[str, RowSummary]:
+        """The lines of the table by name."""
+        return {row.name: row for row in summarise(self.study, self.measures)}
+
+    def trials(self, name: str) -> list[TrialMeasures]:
+        """Those of one row."""
+        return [one for one in self.measures if one.row == name]
+
+    def row(self, name: str) -> Row:
+        """How a row is defined."""
+        return next(row for row in self.study.rows if row.name == name)
+
+    def best(self, measure: str) -> str:
+        """The row other than scratch with the least hours, `target` or `total`."""
+        others = [name for name in self.rows if name != self.scratch]
+        return min(others, key=lambda name: float(getattr(self.rows[name], measure).estimate))
+
+
+def read_evidence(folder: Path | str) -> dict[str, Evidence]:
+    """All studies whose results lie in this folder, each in one of its own, by folder's name.
+
+    Raises:
+        StudyError: there are none.
+    """
+    folders = sorted(path.parent for path in Path(folder).glob(f"*/{STUDY_FILE}"))
+    if not folders:
+        raise StudyError(f"{folder} holds no studies' results: no folder in it has a {STUDY_FILE}")
+    return {each.name: Evidence(read_results(each)) for each in folders}
+
+
+def difference(
+    first: tuple[Evidence, str], second: tuple[Evidence, str], measure: str
+) -> Comparison:
+    """Mean of a measure in a row less that in another, of the same study or of another one.
+
+    Trials of one number are pairs where the two rows share a source run: in one study as it
+    declares, in two if they have one seed and the rows' source runs one name (the seed plan).
+    """
+    (one, name), (other, other_name) = first, second
+    return compare(
+        one.trials(name),
+        other.trials(other_name),
+        measure,
+        _are_paired(one, name, other, other_name),
+    )
+
+
+def scratch_difference(first: Evidence, second: Evidence) -> Comparison | None:
+    """By how many hours the scratch rows of two studies differ; None if they are the same trials.
+
+    Rows from scratch of one seed, one world and one learner are the same trials by the seed plan;
+    of two versions, worlds or seeds they are independent.
+    """
+    one, other = first.trials(first.scratch), second.trials(second.scratch)
+    shared = {trial.trial for trial in one} & {trial.trial for trial in other}
+    hours = [
+        [trial.target_hours for trial in trials if trial.trial in shared] for trials in (one, other)
+    ]
+    if shared and hours[0] == hours[1]:
+        return None
+    return compare(one, other, "target_hours", paired=False)
+
+
+def _are_paired(one: Evidence, name: str, other: Evidence, other_name: str) -> bool:
+    first, second = one.row(name), other.row(other_name)
+    if one is other:
+        return one.study.are_paired(first, second)
+    if not (first.stages and second.stages) or not _same_world(one, other):
+        return False
+    return one.study.source_name(first, 0) == other.study.source_name(second, 0)
+
+
+def _same_world(one: Evidence, other: Evidence) -> bool:
+    """Do equal seeds give equal source runs in both studies?"""
+    names = ("seed", "field", "profile", "world", "learner", "ordering", "widths", "shared_keepers")
+    versions = {record.code_version for each in (one, other) for record in each.results.records}
+    return len(versions) == 1 and all(
+        getattr(one.study, name) == getattr(other.study, name) for name in names
+    )
+
+
+Studies = Mapping[str, Evidence]
