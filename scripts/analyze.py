@@ -2,11 +2,15 @@
 
     .venv/bin/python scripts/analyze.py results/table2
     .venv/bin/python scripts/analyze.py results/table2 --threshold 8 --out results/table2-at-8
+    .venv/bin/python scripts/analyze.py results/table2 --beside results/variants_1000
+    .venv/bin/python scripts/analyze.py src/keepaway_transfer/results --page
     .venv/bin/python scripts/analyze.py out/bag
     .venv/bin/python scripts/analyze.py first.kwy second.kwy --threshold 9
 
 The report is written beside the results if no other folder is named; a bag's to BAG/analysis. Of a
-bag it has a line for every episode (CSV and Parquet), hold times, passes, losses and actions.
+bag it has a line for every episode (CSV and Parquet), hold times, passes, losses and actions. With
+--beside it says by how much two studies' rows from scratch differ; --page makes the report of every
+study in a folder, and the page of what they show.
 """
 
 import argparse
@@ -21,9 +25,15 @@ from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer import metrics
 from keepaway_transfer.errors import LogError, TransferError
+from keepaway_transfer.reports import plotting
+from keepaway_transfer.reports.evidence import Evidence, read_evidence, scratch_difference
 from keepaway_transfer.reports.kwy import KeepawayLog, read_kwy
+from keepaway_transfer.reports.page import page as page_of
+from keepaway_transfer.reports.page import page_figures
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.studies.results import pack, read_results
+
+PAGE = Path("src/keepaway_transfer/docs/results.md")
 
 
 def main() -> int:
@@ -39,15 +49,10 @@ def main() -> int:
         path = arguments.results[0]
         if is_bag(path) or path.is_file():
             return _analyse_bag(path, arguments.out, arguments.match)
-        results = read_results(path)
-        out = arguments.out or path
-        print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
-        pack(path, out)
+        return _analyse_study(path, arguments)
     except (TransferError, KeepawayError, FileNotFoundError) as error:
         print(f"analyze: {error}", file=sys.stderr)
         return 1
-    print(f"Written to {out}: table.md, figures and all they are made of, trials.parquet.")
-    return 0
 
 
 def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
@@ -55,6 +60,43 @@ def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
     print(analyse(bag, out, number))
     print(f"Written to {out}: episodes.csv and .parquet, summary.json and four figures.")
     return 0
+
+
+def _analyse_study(folder: Path, arguments: argparse.Namespace) -> int:
+    if arguments.beside:
+        print(_scratch_line(folder, arguments.beside))
+        return 0
+    if arguments.page:
+        return _write_page(folder, arguments.page)
+    results, out = read_results(folder), arguments.out or folder
+    print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
+    pack(folder, out)
+    print(f"Written to {out}: table.md, figures and all they are made of, trials.parquet.")
+    return 0
+
+
+def _write_page(folder: Path, page: Path) -> int:
+    studies = read_evidence(folder)
+    for name, one in studies.items():
+        write_report(one.results, folder / name)
+    figures = page.with_suffix("")
+    figures.mkdir(parents=True, exist_ok=True)
+    for name, figure in page_figures(studies).items():
+        plotting.save(figure, figures / f"{name}.png", "scripts/analyze.py --page")
+    page.write_text(page_of(studies), encoding="utf-8")
+    print(f"Written: the reports of {', '.join(studies)}, {page} and {figures}.")
+    return 0
+
+
+def _scratch_line(first: Path, second: Path) -> str:
+    one, other = (Evidence(read_results(folder)) for folder in (first, second))
+    found = scratch_difference(one, other)
+    if found is None:
+        return f"The rows from scratch of {first} and {second} are the same trials."
+    return (
+        f"From scratch {first} takes {found.difference:+.2f} h of {one.study.target} against"
+        f" {second} (95 % {found.low:.2f} to {found.high:.2f}; p = {found.p_value:.2g}, Welch)."
+    )
 
 
 def _logs_line(paths: list[Path], threshold: float, window: int) -> str:
@@ -100,6 +142,10 @@ def _parse() -> argparse.Namespace:
     )
     parser.add_argument("--match", type=int, help="number of the match, where a bag has several")
     parser.add_argument("--out", type=Path, help="another folder for the report")
+    parser.add_argument("--beside", type=Path, metavar="FOLDER", help="of another study")
+    parser.add_argument(
+        "--page", type=Path, nargs="?", const=PAGE, metavar="FILE", help=f"default {PAGE}"
+    )
     return parser.parse_args()
 
 

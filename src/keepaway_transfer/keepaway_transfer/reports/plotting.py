@@ -118,6 +118,39 @@ def share_reached(curves: Mapping[str, SurvivalCurve], limit: float, title: str)
     return figure
 
 
+def intervals(
+    labels: Sequence[str],
+    estimates: Sequence[Interval],
+    *,
+    title: str,
+    x_label: str,
+    zero: bool = False,
+) -> Figure:
+    """Estimates with their intervals, one under the other; a point alone has no width.
+
+    Args:
+        labels: of each, from the top.
+        estimates: in the same order.
+        title: above the axes.
+        x_label: what they are.
+        zero: a line where there is no difference; else the axis begins at zero.
+    """
+    figure, axes = _figure(title, x_label, "")
+    places = np.arange(len(labels))[::-1]
+    middle, low, high = np.array(estimates).T
+    axes.errorbar(
+        middle, places, xerr=[middle - low, high - middle], color=COLOURS[1], marker="o",
+        markersize=6, capsize=3, linewidth=1.2, linestyle="none",
+    )  # fmt: skip
+    axes.set_yticks(places, labels)
+    axes.set_ylim(-0.6, len(labels) - 0.4)
+    if zero:
+        axes.axvline(0, color="black", linestyle="--", linewidth=0.8)
+    else:
+        axes.set_xlim(left=0)
+    return figure
+
+
 def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
     """Distribution of episode durations: the share of episodes still going on.
 

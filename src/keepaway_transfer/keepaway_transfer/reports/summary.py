@@ -218,7 +218,7 @@ def _measures(
         trial=record.number,
         source_episodes=record.source_episodes,
         source_hours=record.source_hours,
-        start_level=record.start_level,
+        start_level=_known(record.start_level),
         reached=crossing.reached and crossing.hours <= study.max_hours,
         target_episodes=crossing.episodes,
         target_hours=target_hours,
@@ -226,9 +226,13 @@ def _measures(
         initial_performance=record.initial,
         asymptotic_performance=record.final if goes_on else float("nan"),
         total_reward=_total_reward(record, horizon, study.window),
-        greedy_performance=record.greedy,
+        greedy_performance=_known(record.greedy),
         code_version=record.code_version,
     )
+
+
+def _known(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def _total_reward(record: Record, horizon: float, window: int) -> float:

@@ -55,13 +55,13 @@ SCHEMA = pa.schema(
 
 @dataclass(frozen=True)
 class Record:
-    """What is kept of one trial. Hours are simulated."""
+    """What is kept of one trial. Hours are simulated; None is what is not known."""
 
     row: str
     number: int  # within the row
     source_episodes: int
     source_hours: float
-    start_level: float  # [s] of the values that the target task began with (`parts`); may be NaN
+    start_level: float | None  # [s] of the values that the target task began with (`parts`)
     crossed: bool  # did the windowed mean pass the study's threshold?
     crossing_episodes: int  # of the target task until then, or all of them
     crossing_hours: float
@@ -69,7 +69,7 @@ class Record:
     hours: float
     initial: float  # [s] mean duration of the first episodes
     final: float  # [s] mean duration of the last window of episodes
-    greedy: float  # [s] mean duration without learning and exploring; NaN if not played
+    greedy: float | None  # [s] mean duration without learning and exploring
     block: int  # episodes in a block
     blocks: tuple[int, ...]  # duration of each whole block of episodes [cycles of 0.1 s]
     first: tuple[int, ...]  # durations of the first episodes [cycles]
@@ -112,7 +112,7 @@ def durations_record(
         "hours": metrics.hours(seconds),
         "initial": metrics.initial_performance(seconds),
         "final": metrics.asymptotic_performance(seconds, window),
-        "greedy": float(np.mean(greedy_cycles)) * CYCLE_TIME if len(greedy_cycles) else np.nan,
+        "greedy": float(np.mean(greedy_cycles)) * CYCLE_TIME if len(greedy_cycles) else None,
         "block": block,
         "blocks": tuple(whole.reshape(-1, block).sum(axis=1).tolist()),
         "first": tuple(cycles[: metrics.FIRST_EPISODES]),

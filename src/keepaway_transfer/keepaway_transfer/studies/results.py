@@ -12,7 +12,6 @@ A folder with that file is whole without the other, and a study can go on in it.
 import fcntl
 import json
 import logging
-import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -85,7 +84,7 @@ def record_of(trial: StudyTrial, study: Study) -> Record:
         number=trial.number,
         source_episodes=sum(run.episodes for run in trial.sources),
         source_hours=cycles * CYCLE_TIME / metrics.SECONDS_PER_HOUR,
-        start_level=math.nan if trial.start_level is None else trial.start_level,
+        start_level=trial.start_level,
         code_version=trial.code_version,
         **durations_record(trial.cycles, trial.greedy_cycles, study.threshold, study.window),
     )

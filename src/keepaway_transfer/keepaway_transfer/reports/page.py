@@ -1,0 +1,395 @@
+"""The page of results: what is true of transfer, in words and figures that follow from the data.
+
+Every number on it is worked out of the committed trials, or read from `elsewhere.json`, which holds
+what was measured on the real server. A study that was not run is named with the command to run it.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from keepaway_transfer.reports import plotting
+from keepaway_transfer.reports.evidence import Evidence, Studies, difference, scratch_difference
+from keepaway_transfer.reports.page_parts import (
+    Lines,
+    not_run,
+    own_picture,
+    picture,
+    said_of,
+    study_table,
+)
+from keepaway_transfer.reports.report import power, spread
+from keepaway_transfer.reports.statistics import Comparison, Interval, holm
+from keepaway_transfer.reports.summary import verdict
+
+ELSEWHERE_FILE = Path(__file__).with_name("elsewhere.json")
+TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5")
+NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
+
+
+def page(studies: Studies) -> str:
+    """The page as Markdown.
+
+    Args:
+        studies: results by the name of their folder.
+    """
+    elsewhere = json.loads(ELSEWHERE_FILE.read_text(encoding="utf-8"))
+    sections = [
+        ["# What transfer is worth", "", *_opening()],
+        ["## What the paper claims", "", *PAPER],
+        ["## What was seen here, row by row", "", *_rows(studies)],
+        ["## What optimism explains", "", *_optimism(studies)],
+        ["## What transfer adds beyond it", "", *_beyond(studies)],
+        ["## What too much training does, and why", "", *_overtraining(studies)],
+        ["## What the real server showed", "", *_real_server(elsewhere["real_server"])],
+        ["## What others measured", "", *_others(elsewhere["others"])],
+        ["## A transfer that never hurts", "", *_never_hurts(studies)],
+        ["## The data", "", *_data(studies)],
+    ]
+    return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
+
+
+def page_figures(studies: Studies) -> dict[str, Figure]:
+    """The figures of the page that are not a study's own, by name."""
+    elsewhere = json.loads(ELSEWHERE_FILE.read_text(encoding="utf-8"))
+    figures = {
+        "real_server": _real_server_figure(elsewhere["real_server"]),
+        "others": _others_figure(elsewhere["others"]),
+    }
+    if {"table2", "optimistic"} <= studies.keys():
+        figures["beyond_optimism"] = _beyond_figure(studies)
+    return figures
+
+
+def beyond_optimism(studies: Studies) -> dict[str, tuple[Comparison, Comparison, Comparison]]:
+    """Every row of Table 2 with a source against the best optimistic start by target hours.
+
+    Returns:
+        by row: target hours saved, total hours saved, seconds held longer at first.
+    """
+    table2, optimistic = studies["table2"], studies["optimistic"]
+    best = optimistic, optimistic.best("target")
+    return {
+        name: (
+            difference(best, (table2, name), "target_hours"),
+            difference(best, (table2, name), "total_hours"),
+            difference((table2, name), best, "initial_performance"),
+        )
+        for name in table2.rows
+        if name != table2.scratch
+    }
+
+
+PAPER = [
+    "Taylor & Stone (2005) train 4v3 keepers until they hold the ball for 9.0 s on average over"
+    " 1,000 episodes, from scratch and after 10 to 9,000 episodes of 3v2 that rho carries over."
+    " They report that every amount of 3v2 shortens the time in 4v3, that some shorten the time in"
+    " all,"
+    " that 9,000 episodes serve 4v3 worse than 1,000 (overtraining), and that transferred keepers"
+    " begin hardly better than new ones but learn faster. A modified rho takes 10 to 20 % longer in"
+    " all than rho. There is no row that starts with a constant instead of a source: whether it is"
+    " what was learned that helps, or only that something is expected of every action, is open"
+    " there.",
+]  # fmt: skip
+
+
+def _opening() -> Lines:
+    return [
+        "This page is written by `scripts/analyze.py src/keepaway_transfer/results --page` from the"
+        " trials in that folder. Hours are simulated; intervals, in brackets, are of 95 %; errors"
+        " are by trial. Saved hours are positive. Rows are compared as pairs where their trials share"
+        " a source run, else by Welch's test, and p-values are"
+        " adjusted by Holm over the rows of a table.",
+    ]
+
+
+def _rows(studies: Studies) -> Lines:
+    if (table2 := studies.get("table2")) is None:
+        return not_run("table2")
+    lines = [
+        *said_of(table2, "target", "the time in 4v3"),
+        *said_of(table2, "total", "the time in all"),
+        "",
+        *study_table(table2, table2.scratch, "episodes of 3v2"),
+        "",
+        power(table2.measures, table2.study),
+        "",
+        picture("Hours to 9.0 s by episodes of 3v2", "table2"),
+    ]
+    for name, words, figure in (
+        ("table2_at_8.2", "The same trials at another threshold", "time_to_threshold"),
+        ("figure3", "Figure 3: learning for a fixed time", "learning_curves"),
+        ("fivevfour", "5v4", "time_to_threshold"),
+    ):
+        if (found := studies.get(name)) is not None:
+            lines += ["", f"### {words}", "", *study_table(found, found.scratch, "row")]
+            lines += ["", picture(words, name, figure)]
+    for name in ("rho_variants", "variants_1000"):
+        if (found := studies.get(name)) is not None:
+            lines += ["", f"### Other ways than rho (`{name}`)", "", *_variants(found)]
+            lines += ["", picture("Hours to 9.0 s by the way of transfer", name)]
+    return lines
+
+
+def _variants(variants: Evidence) -> Lines:
+    lines: Lines = []
+    for reference in variants.study.references:
+        lines += [f"Against {reference}:", "", *study_table(variants, reference, "way"), ""]
+    return lines[:-1]
+
+
+def _optimism(studies: Studies) -> Lines:
+    if (optimistic := studies.get("optimistic")) is None:
+        return not_run("optimistic")
+    best = optimistic.best("target")
+    hours = optimistic.rows[best].target
+    lines = [
+        "No 3v2 at all, and every action of every state worth so many seconds at first. The best"
+        f" level is {best}: {spread(hours)} h of 4v3"
+        f" ({spread(optimistic.rows[optimistic.scratch].target)} from scratch).",
+        *said_of(optimistic, "target", "the time in 4v3"),
+        "",
+        *study_table(optimistic, optimistic.scratch, "level"),
+        "",
+        picture("Hours to 9.0 s by the level of the start", "optimistic"),
+    ]
+    if (table2 := studies.get("table2")) is not None:
+        lines += ["", _of_transfers_gain(table2, optimistic, best)]
+    return lines
+
+
+def _of_transfers_gain(table2: Evidence, optimistic: Evidence, best: str) -> str:
+    transfer = table2.best("target")
+    by_transfer = table2.rows[transfer].against[table2.scratch].target
+    by_optimism = optimistic.rows[best].against[optimistic.scratch].target
+    share = by_optimism.difference / by_transfer.difference
+    return (
+        f"Transfer after {transfer} episodes saves {spread(by_transfer)} h of 4v3 against scratch,"
+        f" the optimistic start {spread(by_optimism)} h: {share:.0%} of it, without a source."
+    )
+
+
+def _beyond(studies: Studies) -> Lines:
+    missing = [name for name in ("table2", "optimistic") if name not in studies]
+    lines = not_run(*missing) if missing else _beyond_table(studies)
+    for name in ("jumpstart", "jumpstart_framework"):
+        if (jumpstart := studies.get(name)) is not None:
+            lines += ["", f"### The first episodes (`{name}`)", "", *_jumpstart(jumpstart)]
+    return lines
+
+
+def _beyond_table(studies: Studies) -> Lines:
+    found = beyond_optimism(studies)
+    adjusted = [holm([three[k].p_value for three in found.values()]) for k in range(3)]
+    best = studies["optimistic"].best("target")
+    lines = [
+        f"Every row of Table 2 against the best optimistic start, {best}:",
+        "",
+        "| episodes of 3v2 | 4v3 hours saved | p | | total hours saved | p | | longer at first (s)"
+        " | p |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for i, (name, (target, total, start)) in enumerate(found.items()):
+        p_target, p_total, p_start = (float(p[i]) for p in adjusted)
+        lines.append(
+            f"| {name} | {spread(target)} | {p_target:.2g} | {verdict(target, p_target)}"
+            f" | {spread(total)} | {p_total:.2g} | {verdict(total, p_total)}"
+            f" | {spread(start)} | {p_start:.2g} |"
+        )
+    title = "What transfer saves against an optimistic start"
+    return [*lines, "", own_picture(title, "beyond_optimism")]
+
+
+def _jumpstart(jumpstart: Evidence) -> Lines:
+    reference = jumpstart.scratch
+    lines = [
+        f"Seconds held longer than {reference} over the first 100 episodes:",
+        "",
+        "| row | trials | longer at first (s) | p |",
+        "|---|---|---|---|",
+    ]
+    for row in jumpstart.rows.values():
+        if (found := row.against.get(reference)) is not None:
+            lines.append(
+                f"| {row.name} | {row.trials} | {spread(found.jumpstart)}"
+                f" | {found.jumpstart_holm:.2g} |"
+            )
+    return lines
+
+
+def _overtraining(studies: Studies) -> Lines:
+    found = [name for name in ("overtraining", "variants_6000") if name in studies]
+    if not found:
+        return not_run("variants_6000")
+    lines = [
+        "An action's value is a sum over state variables, 13 in 3v2 and 19 in 4v3: copied weights"
+        " expect half as much again as 3v2 gave, and late 3v2 gives far more than 4v3 can. If"
+        " over-estimated values are the reason, the same weights at a lower level must be learned"
+        " from faster; if the skills are too special for 3v2, they must not.",
+    ]
+    for name in found:
+        one = studies[name]
+        lines += ["", *_lower_level(one)]
+        for reference in one.study.references:
+            lines += ["", f"`{name}`, against {reference}:", ""]
+            lines += study_table(one, reference, "row")
+        lines += ["", picture("Hours to 9.0 s", name)]
+    return lines
+
+
+def _lower_level(one: Evidence) -> Lines:
+    """What the most trained row gives as rho carries it, and the best way to carry the same."""
+    most = max(row.source_episodes for row in one.study.rows)
+    names = [name for name in one.rows if one.row(name).source_episodes == most]
+    plain = next(name for name in names if one.row(name).variant == "rho")
+    best = min(names, key=lambda name: one.rows[name].target.estimate)
+    saved = difference((one, plain), (one, best), "target_hours")
+    gain = one.rows[best].against[one.scratch].target
+    return [
+        f"After {most:,} episodes 4v3 takes {spread(one.rows[plain].target)} h as rho carries them"
+        f" and {spread(one.rows[best].target)} h as `{one.row(best).variant}` does:"
+        f" {spread(saved)} h are saved by the way of carrying alone, and {spread(gain)} h against"
+        " scratch.",
+    ]
+
+
+def _never_hurts(studies: Studies) -> Lines:
+    tables = [name for name in TABLES if name in studies]
+    if "optimistic" not in studies or len(tables) < 2:
+        wanted = ("optimistic", *TABLES[1:])
+        return [
+            "Looked for is a way whose 4v3 hours after 1,000, 3,000, 6,000 and 9,000 episodes are"
+            " nowhere worse than from scratch and than from the best optimistic start, and whose"
+            " best total beats that start.",
+            *not_run(*(name for name in wanted if name not in studies)),
+        ]
+    lines = [
+        "| study | nowhere worse than scratch | nowhere worse than the best optimistic start"
+        " | best total against that start (hours saved) | |",
+        "|---|---|---|---|---|",
+    ]
+    return lines + [_never_hurts_row(studies, name) for name in tables]
+
+
+def _never_hurts_row(studies: Studies, name: str) -> str:
+    table, optimistic = studies[name], studies["optimistic"]
+    start = optimistic, optimistic.best("target")
+    names = [row for row in NEVER_WORSE_AT if row in table.rows]
+    worse = []
+    for reference in ((table, table.scratch), start):
+        saved = [difference(reference, (table, row), "target_hours") for row in names]
+        p_values = holm([one.p_value for one in saved])
+        judged = zip(names, saved, p_values, strict=True)
+        costs = [row for row, one, p in judged if verdict(one, float(p)) == "costs"]
+        worse.append(f"worse after {', '.join(costs)}" if costs else "yes")
+    best = table.best("total")
+    total = difference(start, (table, best), "total_hours")
+    return (
+        f"| `{name}` | {worse[0]} | {worse[1]} | after {best}: {spread(total)}"
+        f" | {verdict(total, total.p_value)} |"
+    )
+
+
+def _real_server(real: dict[str, Any]) -> Lines:
+    lines = [
+        f"{real['what']}. One run an arm shows a direction, no more.",
+        "",
+        "| 4v3 | hours before | to 8.0 s (h) | to 9.0 s (h) | first 100 episodes (s)"
+        " | value of the action chosen, first 20 episodes (s) |",
+        "|---|---|---|---|---|---|",
+    ]
+    for arm in real["arms"]:
+        mean, error = arm["first_100"]
+        to_8, to_9 = (_hours_or_never(arm[key], real) for key in ("to_8", "to_9"))
+        lines.append(
+            f"| {arm['name']} | {arm['source_hours']:g} | {to_8} | {to_9} | {mean} +- {error}"
+            f" | {arm['chosen_value']} |"
+        )
+    return [
+        *lines,
+        "",
+        own_picture("Hours of 4v3 to 9.0 s on the real server", "real_server"),
+    ]
+
+
+def _hours_or_never(hours: float | None, real: dict[str, Any]) -> str:
+    return f"not in {real['limit_hours']:g}" if hours is None else f"{hours:g}"
+
+
+def _others(others: dict[str, Any]) -> Lines:
+    lines = [f"{others['what']}.", "", "| 4v3 | hours |", "|---|---|"]
+    lines += [f"| {row['name']} | {row['hours']} |" for row in others["rows"]]
+    return [
+        *lines,
+        "",
+        own_picture("Hours of 4v3 to 9.0 s as others measured them", "others"),
+    ]
+
+
+def _data(studies: Studies) -> Lines:
+    lines = ["| study | trials | seed | code | |", "|---|---|---|---|---|"]
+    for name, one in studies.items():
+        versions = ", ".join(sorted({record.code_version for record in one.results.records}))
+        lines.append(
+            f"| [`{name}`](../results/{name}/table.md) | {len(one.results.records)}"
+            f" | {one.study.seed} | {versions} | {one.results.note} |"
+        )
+    return [*lines, "", *_scratch_rows(studies)]
+
+
+def _scratch_rows(studies: Studies) -> Lines:
+    """By how much the scratch rows of studies differ from Table 2's."""
+    if (table2 := studies.get("table2")) is None:
+        return []
+    lines = [
+        "Rows from scratch that are to the same threshold, against Table 2's (hours of 4v3 more):",
+        "",
+    ]
+    for name, other in studies.items():
+        if other is table2 or not _same_goal(table2, other):
+            continue
+        found = scratch_difference(other, table2)
+        lines.append(f"- `{name}`: " + ("the same trials" if found is None else spread(found)))
+    return lines if len(lines) > 2 else []
+
+
+def _same_goal(one: Evidence, other: Evidence) -> bool:
+    names = "target", "threshold", "window", "max_hours"
+    return all(getattr(one.study, name) == getattr(other.study, name) for name in names)
+
+
+def _real_server_figure(real: dict[str, Any]) -> Figure:
+    limit = real["limit_hours"]
+    hours = [limit if arm["to_9"] is None else arm["to_9"] for arm in real["arms"]]
+    labels = [
+        arm["name"] + (f" (not in {limit:g} h)" if arm["to_9"] is None else "")
+        for arm in real["arms"]
+    ]
+    return plotting.intervals(
+        labels,
+        [Interval(one, one, one) for one in hours],
+        title="The real server, one run an arm",
+        x_label="Hours of 4v3 to 9.0 s",
+    )
+
+
+def _others_figure(others: dict[str, Any]) -> Figure:
+    return plotting.intervals(
+        [row["name"] for row in others["rows"]],
+        [Interval(row["hours"], row["hours"], row["hours"]) for row in others["rows"]],
+        title="Hua & Sheppard 2023, means of 10 trials",
+        x_label="Hours of 4v3 to 9.0 s",
+    )
+
+
+def _beyond_figure(studies: Studies) -> Figure:
+    found = beyond_optimism(studies)
+    return plotting.intervals(
+        list(found),
+        [Interval(*total[:3]) for _, total, _ in found.values()],
+        title=f"Table 2 against the best optimistic start ({studies['optimistic'].best('target')})",
+        x_label="Total hours saved",
+        zero=True,
+    )
