@@ -99,9 +99,9 @@ def _opening() -> Lines:
     return [
         "This page is written by `scripts/analyze.py src/keepaway_transfer/results --page` from the"
         " trials in that folder. Hours are simulated; intervals, in brackets, are of 95 %; errors"
-        " are by trial. Saved hours are positive. Rows are compared as pairs where their trials share"
-        " a source run, else by Welch's test, and p-values are"
-        " adjusted by Holm over the rows of a table.",
+        " are by trial. Saved hours are positive. Rows are compared as pairs where their trials"
+        " share a source run, else by Welch's test, and p-values are adjusted by Holm over the rows"
+        " of a table.",
     ]
 
 

@@ -1,0 +1,108 @@
+"""What the page says of studies with known answers."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from keepaway_transfer.reports.evidence import (
+    Evidence,
+    difference,
+    read_evidence,
+    scratch_difference,
+)
+from keepaway_transfer.reports.page import beyond_optimism, page, page_figures
+from keepaway_transfer.studies.records import Record
+from keepaway_transfer.studies.results import Results
+from keepaway_transfer.studies.study import load_study
+
+HOURS = {"0": 30.0, "0 s": 30.0, "2 s": 21.0, "5 s": 18.0, "8 s": 20.0, "12 s": 26.0, "20 s": 58.0}
+
+
+def record(row, number, target, source=0.0, initial=5.0):
+    return Record(
+        row=row, number=number, source_episodes=int(source > 0), source_hours=source,
+        start_level=None, crossed=target < 60, crossing_episodes=100, crossing_hours=target,
+        episodes=100, hours=target, initial=initial, final=9.0, greedy=None, block=50, blocks=(),
+        first=(), last=(), code_version="v1",
+    )  # fmt: skip
+
+
+def study_of(name, mean_of, trials=12, shift=0.0):
+    """Results in which trials lie one hour apart around their row's mean."""
+    study = load_study(name)
+    spread = np.arange(trials) - (trials - 1) / 2 + shift
+    records = [
+        record(row.name, k, mean_of(row) + spread[k], source=0.002 * row.source_episodes)
+        for row in study.rows
+        for k in range(trials)
+    ]
+    return Evidence(Results(study, f"scripts/study.py {name}", "v1", tuple(records)))
+
+
+def table(name, best):
+    return study_of(name, lambda row: best.get(row.source_episodes, 25.0))
+
+
+@pytest.fixture
+def studies():
+    over = {0: 30.0, 1000: 16.0, 6000: 45.0, 9000: 55.0}
+    never = {0: 30.0, 1000: 12.0, 3000: 15.0, 6000: 18.0, 9000: 18.0}
+    return {
+        "table2": table("table2", over),
+        "table2_at_5": table("table2_at_5", never),
+        "optimistic": study_of("optimistic", lambda row: HOURS[row.name]),
+    }
+
+
+def test_transfer_is_compared_with_the_best_optimistic_start(studies):
+    target, total, start = beyond_optimism(studies)["1000"]
+    assert target.difference == pytest.approx(18.0 - 16.0)
+    assert total.difference == pytest.approx(18.0 - 16.0 - 2.0)
+    assert start.difference == 0.0
+
+
+def test_the_page_says_what_optimism_explains(studies):
+    text = page(studies)
+    assert "The best level is 5 s: 18.00 [" in text
+    assert "the optimistic start 12.00 [" in text
+    assert "h: 86% of it, without a source." in text
+
+
+def test_a_way_that_never_hurts_is_told_from_one_that_does(studies):
+    lines = {line.split("|")[1].strip(): line for line in page(studies).splitlines() if "|" in line}
+    assert "| worse after 6000 and 9000 | worse after" in lines["`table2`"]
+    assert "| yes | yes | after 1000: 4.00 [" in lines["`table2_at_5`"]
+
+
+def test_studies_that_were_not_run_are_named_with_their_command(studies):
+    del studies["optimistic"]
+    text = page(studies)
+    assert text.count("`scripts/study.py optimistic --out out/optimistic`") == 3
+    assert "beyond_optimism" not in page_figures(studies)
+
+
+def test_equal_scratch_rows_are_the_same_trials(studies):
+    assert scratch_difference(studies["optimistic"], studies["table2"]) is None
+    assert "- `optimistic`: the same trials" in page(studies)
+
+
+def test_scratch_rows_of_other_trials_differ_by_a_number_of_hours(studies):
+    other = study_of("optimistic", lambda row: HOURS[row.name], shift=0.5)
+    found = scratch_difference(other, studies["table2"])
+    assert found.difference == pytest.approx(0.5)
+
+
+def test_rows_of_two_studies_are_pairs_where_they_share_their_source_runs(studies):
+    table2, at_5 = studies["table2"], studies["table2_at_5"]
+    # Every trial is four hours faster: as pairs that is certain.
+    assert difference((table2, "1000"), (at_5, "1000"), "target_hours") == (4.0, 4.0, 4.0, 0.0)
+    other = Evidence(
+        dataclasses.replace(at_5.results, study=dataclasses.replace(at_5.results.study, seed=1))
+    )
+    assert difference((table2, "1000"), (other, "1000"), "target_hours").low < 4.0
+
+
+def test_a_folder_without_studies_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="holds no studies' results"):
+        read_evidence(tmp_path)

@@ -1,0 +1,142 @@
+"""The page of results and the committed trials say the same, and a second route says so too.
+
+The second route reads the Parquet files with pandas, pairs by number, and tests with scipy alone.
+"""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from keepaway_transfer.reports.evidence import read_evidence
+from keepaway_transfer.reports.page import page
+
+PACKAGE = Path(__file__).parents[3] / "src/keepaway_transfer"
+RESULTS, PAGE = PACKAGE / "results", PACKAGE / "docs/results.md"
+STUDIES = sorted(path.parent.name for path in RESULTS.glob("*/study.json"))
+MEGABYTE = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def studies():
+    return read_evidence(RESULTS)
+
+
+def test_the_page_is_what_the_trials_give(studies):
+    assert PAGE.read_text(encoding="utf-8") == page(studies), (
+        "run scripts/analyze.py src/keepaway_transfer/results --page"
+    )
+
+
+def test_every_picture_of_the_page_is_there():
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]*)\)", PAGE.read_text(encoding="utf-8"))
+    assert pictures
+    assert [one for one in pictures if not (PAGE.parent / one).is_file()] == []
+
+
+def test_sentences_hold_no_p_values():
+    sentences = [line for line in PAGE.read_text("utf-8").splitlines() if not line.startswith("|")]
+    assert [line for line in sentences if re.search(r"\bp ?[=<]", line)] == []
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_studys_trials_take_less_than_a_megabyte(name):
+    assert (RESULTS / name / "trials.parquet").stat().st_size < MEGABYTE
+
+
+def hours_of(name):
+    """Every trial's hours, by pandas."""
+    head = json.loads((RESULTS / name / "study.json").read_text())["study"]
+    trials = pd.read_parquet(RESULTS / name / "trials.parquet")
+    trials["target"] = trials.crossing_hours.clip(upper=head["max_hours"])
+    trials["total"] = trials.source_hours + trials.target
+    return head, trials.set_index(["row", "number"]).sort_index()
+
+
+def are_pairs(head, first, second):
+    """Do trials of one number share their source run, by what study.json declares?"""
+    if head.get("shared_seeds"):
+        return True
+    stages = [
+        next(row for row in head["rows"] if row["name"] == name)["stages"]
+        for name in (first, second)
+    ]
+    if not all(stages):
+        return False
+    if head["shared_sources"]:
+        return stages[0][0]["task"] == stages[1][0]["task"]
+    return stages[0][0] == stages[1][0]
+
+
+def by_hand(head, trials, reference, row, measure):
+    """Hours saved, interval and p, by scipy."""
+    before, after = trials.loc[reference][measure], trials.loc[row][measure]
+    if are_pairs(head, reference, row):
+        both = pd.concat([before, after], axis=1, join="inner").to_numpy()
+        test = stats.ttest_rel(both[:, 0], both[:, 1])
+    else:
+        test = stats.ttest_ind(before, after, equal_var=False)
+    interval = test.confidence_interval()
+    return before.mean() - after.mean(), interval.low, interval.high, test.pvalue
+
+
+def holm_by_hand(p_values):
+    """Holm's step-down procedure as it is written down, on one table's p-values."""
+    order, adjusted, largest = np.argsort(p_values), np.empty(len(p_values)), 0.0
+    for rank, place in enumerate(order):
+        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[place]))
+        adjusted[place] = largest
+    return adjusted
+
+
+def verdict_by_hand(difference, low, high, p_value):
+    if p_value < 0.05:
+        return "saves" if difference > 0 else "costs"
+    furthest = max(abs(low), abs(high))
+    return f"none: within {furthest:.1f} h" if furthest <= 2 else "open"
+
+
+def compared():
+    """Every study with every reference that other rows can be compared with."""
+    for name in STUDIES:
+        head = json.loads((RESULTS / name / "study.json").read_text())["study"]
+        if "jumpstart" not in name:  # nobody reaches the threshold there
+            yield from ((name, reference) for reference in head["references"])
+
+
+@pytest.mark.parametrize(("name", "reference"), list(compared()))
+def test_each_verdict_comes_out_again_by_scipy_alone(name, reference):
+    head, trials = hours_of(name)
+    names = [row["name"] for row in head["rows"] if row["name"] != reference]
+    lines = []
+    cells = {row: [] for row in names}
+    for measure in ("target", "total"):
+        found = [by_hand(head, trials, reference, row, measure) for row in names]
+        for row, one, p in zip(
+            names, found, holm_by_hand([each[3] for each in found]), strict=True
+        ):
+            difference, low, high, _ = one
+            cells[row] += [
+                f"{difference:.2f} [{low:.2f}, {high:.2f}]",
+                f"{p:.2g}",
+                verdict_by_hand(difference, low, high, p),
+            ]
+    text = PAGE.read_text(encoding="utf-8")
+    lines = [f"| {' | '.join(cells[row])} |" for row in names]
+    for row, ending in zip(names, lines, strict=True):
+        pattern = rf"^\| {re.escape(row)} \|.*{re.escape(ending)}$"
+        assert re.search(pattern, text, re.MULTILINE), f"{row}: {ending}"
+
+
+def test_rows_of_100_trials_resolve_two_hours_at_80_percent_power():
+    """By simulation: rows drawn from the scratch row's own times, two hours apart."""
+    _, trials = hours_of("table2")
+    scratch = trials.loc["0"]["target"].to_numpy()
+    generator = np.random.default_rng(1)
+    first, second = generator.choice(scratch, size=(2, 2000, 100))
+    p_values = stats.ttest_ind(first, second + 2.0, axis=1, equal_var=False).pvalue
+    assert np.mean(p_values < 0.05) == pytest.approx(0.8, abs=0.04)
