@@ -37,7 +37,7 @@ from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer import metrics
 from keepaway_transfer.reports import plotting
-from keepaway_transfer.reports.statistics import mean_curve
+from keepaway_transfer.reports.statistics import mean_and_error, mean_curve
 from keepaway_transfer.rho import Transfer, transferred
 from keepaway_transfer.studies.processes import WorkerExecutor
 
@@ -264,23 +264,18 @@ def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
 def table(
     learned: dict[str, Any], moved: dict[str, Any], groups: dict[str, list[np.ndarray]]
 ) -> str:
-    """What came out, a row each."""
+    """What came out, a row each; errors are by trial, and a match is but one."""
     rows = [f"{'what':48s} {'held (s)':>9s} {'+-':>5s}"]
+
+    def add(label: str, mean: float, error: float | None) -> None:
+        rows.append(f"{label:48s} {mean:9.2f} {'-' if error is None else f'{error:.2f}':>5s}")
+
     for summary, label in ((learned, "3v2 nodes, learning"), (moved, "4v3 nodes, after transfer")):
-        label += f", {summary['episodes']} episodes"
-        rows.append(
-            f"{label:48s} {summary['mean_duration_s']:9.2f} {summary['sem_duration_s']:5.2f}"
-        )
+        add(f"{label}, {summary['episodes']} episodes", summary["mean_duration_s"], None)
     for label, trials in groups.items():
-        for part, some in (
-            ("first", [t[:200] for t in trials]),
-            ("last", [t[-200:] for t in trials]),
-        ):
-            means = np.array([t.mean() for t in some])
-            error = means.std(ddof=1) / len(means) ** 0.5 if len(means) > 1 else 0.0
-            rows.append(
-                f"{f'4v3 {label}, {part} 200 episodes':48s} {means.mean():9.2f} {error:5.2f}"
-            )
+        for part, episodes in (("first", slice(0, 200)), ("last", slice(-200, None))):
+            means = [durations[episodes].mean() for durations in trials]
+            add(f"4v3 {label}, {part} 200 episodes", *mean_and_error(means))
     return "\n".join(rows)
 
 

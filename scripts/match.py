@@ -291,10 +291,17 @@ def program(args: argparse.Namespace, member: Member) -> list[str]:
 
 
 def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
-    """Say how it went."""
+    """Say how it went.
+
+    A match is one trial: episodes of players that learn in it depend on each other, so there is no
+    error to tell. Of agents from elsewhere it is not known whether they learn.
+    """
+    if "learn" in (args.keeper_policy, args.taker_policy):
+        summary = {**summary, "sem_duration_s": None}
     mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))
     if mean is not None:
-        spread = "" if sem is None else f" +- {sem:.2f}"
+        unknown = " (if nobody learns)" if args.agent else ""
+        spread = "" if sem is None else f" +- {sem:.2f}{unknown}"
         print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
     if args.json:
         print(json.dumps({"task": args.task, "seed": args.seed, **summary}, allow_nan=False))

@@ -16,7 +16,6 @@ import argparse
 import contextlib
 import json
 import logging
-import math
 import os
 import shlex
 import sys
@@ -25,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import stats
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
@@ -208,20 +208,39 @@ def report(
         "taker_policy": training.taker_policy,
         "weights_sha256": folder.weights_hash(episodes) if folder else None,
     }
+    if len(episodes) > 1 or "learn" in (training.policy, training.taker_policy):
+        numbers["sem_duration_s"] = error_of_trials(episodes)
     if arguments.json:
         print(json.dumps(numbers, allow_nan=False))
     elif scores:
-        print(
-            f"{training.task}, {training.policy} keepers, {training.taker_policy} takers:"
-            f" {len(scores):,} episodes in {len(episodes)} trials,"
-            f" {numbers['simulated_hours']:.1f} simulated hours\n"
-            f"mean hold time {numbers['mean_duration_s']:.2f} s"
-            f" +- {numbers['sem_duration_s'] or math.nan:.2f} (standard error),"
-            f" last {LAST} episodes of a trial {numbers['last_mean_duration_s']:.2f} s,"
-            f" out of bounds {numbers['out_of_bounds_share']:.0%}"
-            + (f"\n{rate:,.0f} cycles a second" if rate else "")
-            + (f"\nweights' SHA-256 {numbers['weights_sha256']}" if folder else "")
-        )
+        print(in_words(training, numbers))
+
+
+def error_of_trials(episodes: Episodes) -> float | None:
+    """Standard error [s] of the mean duration; None if there is but one trial.
+
+    Episodes of one learner depend on each other, so its trial counts once.
+    """
+    means = [durations.mean() * CYCLE_TIME for durations, _ in episodes.values()]
+    return float(stats.sem(means)) if len(means) > 1 else None
+
+
+def in_words(training: Training, numbers: dict[str, Any]) -> str:
+    """What `report` prints for a person."""
+    error, trials, rate = (numbers[k] for k in ("sem_duration_s", "trials", "cycles_per_second"))
+    of = f"of {trials} trials" if trials > 1 else "of the episodes"
+    spread = " (one trial: no error is known)" if error is None else f" +- {error:.2f} s ({of})"
+    sha256 = numbers["weights_sha256"]
+    return (
+        f"{training.task}, {training.policy} keepers, {training.taker_policy} takers:"
+        f" {numbers['episodes']:,} episodes in {trials} trials,"
+        f" {numbers['simulated_hours']:.1f} simulated hours\n"
+        f"mean hold time {numbers['mean_duration_s']:.2f} s{spread},"
+        f" last {LAST} episodes of a trial {numbers['last_mean_duration_s']:.2f} s,"
+        f" out of bounds {numbers['out_of_bounds_share']:.0%}"
+        + (f"\n{rate:,.0f} cycles a second" if rate else "")
+        + (f"\nweights' SHA-256 {sha256}" if sha256 else "")
+    )
 
 
 def parse() -> argparse.Namespace:

@@ -74,7 +74,7 @@ def test_two_matches_with_one_seed_are_identical_and_what_the_trainer_plays(
     assert (one["task"], one["episodes"], one["seed"], one["troubles"]) == ("3v2", 3, 5, {})
     durations = [cycles / 10 for cycles in one["episode_cycles"]]
     assert one["mean_duration_s"] == pytest.approx(np.mean(durations))
-    assert one["sem_duration_s"] == pytest.approx(np.std(durations, ddof=1) / np.sqrt(3))
+    assert one["sem_duration_s"] is None  # a match of learners is one trial
     assert one["cycles_per_second"] > 0
 
 

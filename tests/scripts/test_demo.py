@@ -51,3 +51,17 @@ def test_a_place_that_is_no_folder_is_refused_in_one_line(tmp_path: Path) -> Non
     done = demo("--out", tmp_path / "file")
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_tables_errors_are_by_trial() -> None:
+    code = """
+import demo, numpy as np
+match = {"episodes": 60, "mean_duration_s": 7.0, "sem_duration_s": 0.3}
+trials = [np.full(400, 4.0), np.full(400, 6.0)]
+print(demo.table(match, match, {"from scratch": trials}))
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=SCRIPT.parent)
+    _, nodes, _, first, last = done.stdout.splitlines()
+    assert nodes.split()[-2:] == ["7.00", "-"]  # one match of learners is one trial
+    assert first.split()[-2:] == last.split()[-2:] == ["5.00", "1.00"]

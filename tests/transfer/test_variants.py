@@ -1,10 +1,14 @@
 """Names of ways to carry weights over, and what is refused."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from keepaway_agent.actions import Role
 from keepaway_agent.learning.cmac import make_tiling
+from keepaway_transfer import variants
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES
 from keepaway_transfer.parts import PARTS, level_of, sample_of
@@ -24,6 +28,13 @@ def test_every_part_alone_and_every_pair_has_a_name():
     plain = {frozenset(one.parts) for one in VARIANTS.values() if not one.averaged}
     pairs = {frozenset(set(PARTS) - {part}) for part in PARTS}
     assert plain == {*pairs, frozenset(PARTS), *(frozenset({part}) for part in PARTS)}
+
+
+def test_the_readme_names_every_variant():
+    readme = Path(variants.__file__).parents[1] / "README.md"
+    table = readme.read_text("utf-8").split("## Ways to carry")[1].split("## Studies")[0]
+    named = set(re.findall(r"`(\w+)(?:@5)?`", table))
+    assert named >= set(VARIANTS)
 
 
 def test_every_variant_has_a_rule_that_there_is():

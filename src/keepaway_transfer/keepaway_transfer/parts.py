@@ -19,7 +19,7 @@ actions and has the mean 0 over the sample; and the preferences, which tell acti
 
 The sample (`scripts/checks/reference_states.py`) is of states in which keepers have a choice when
 they choose at random. A mean over tiles is no stand-in for it: tiles that were hardly ever seen
-count there as much as others, and it comes out a third lower than the values met in play.
+count there as much as others, and it comes out far below the values that are met in play.
 
 Weights are worth cycles, levels are given in seconds.
 

@@ -166,9 +166,17 @@ def test_the_script_says_how_it_went(tmp_path):
     assert numbers["task"] == "3v2"
     assert (numbers["episodes"], numbers["trials"], numbers["seed"]) == (10, 2, 4)
     assert numbers["mean_duration_s"] == pytest.approx(durations.mean())
-    assert numbers["sem_duration_s"] == pytest.approx(durations.std(ddof=1) / np.sqrt(10))
+    first, second = (results[k].durations.mean() * 0.1 for k in (0, 1))
+    assert numbers["sem_duration_s"] == pytest.approx(abs(first - second) / 2)  # by trial
     assert numbers["out_of_bounds_share"] == (outcomes == Outcome.OUT_OF_BOUNDS).mean()
     assert numbers["simulated_hours"] == pytest.approx(durations.sum() / 3600)
+
+
+@pytest.mark.parametrize(("policy", "is_known"), [("hold", True), ("learn", False)])
+def test_one_trial_has_an_error_only_where_nobody_learns(policy, is_known):
+    done = train("--episodes", 5, "--policy", policy, "--json")
+    error = json.loads(done.stdout.splitlines()[-1])["sem_duration_s"]
+    assert (error is not None) == is_known
 
 
 def test_a_seed_gives_one_hash_of_the_weights_in_every_run_on_any_number_of_processes(tmp_path):

@@ -55,6 +55,21 @@ def test_tables_of_other_ways_have_the_sources_of_table2(name):
     assert len({row.variant for row in other.rows[1:]} - {"rho"}) == 1
 
 
+def test_the_readme_names_every_study_with_its_rows_and_trials():
+    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8").split("## Studies")[1]
+    found: dict[str, str] = {}
+    for names, sizes in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([^|]*) \|", readme, re.MULTILINE):
+        listed = re.findall(r"`(\w+)`", names)
+        each = re.findall(r"\d+ x \d+", sizes)
+        found |= dict(zip(listed, each * (len(listed) if len(each) == 1 else 1), strict=True))
+    expected = {
+        path.stem: f"{len(study.rows)} x {study.trials}"
+        for path in FOLDER.glob("*.toml")
+        if (study := load_study(path.stem)).name != "tiny"
+    }
+    assert found == expected
+
+
 def test_all_studies_of_the_package_have_one_seed():
     seeds = {load_study(path.stem).seed for path in FOLDER.glob("*.toml") if path.stem != "tiny"}
     assert seeds == {2005}
