@@ -90,6 +90,7 @@ def test_equal_scratch_rows_are_the_same_trials(studies):
 def test_scratch_rows_of_other_trials_differ_by_a_number_of_hours(studies):
     other = study_of("optimistic", lambda row: HOURS[row.name], shift=0.5)
     found = scratch_difference(other, studies["table2"])
+    assert found is not None
     assert found.difference == pytest.approx(0.5)
 
 

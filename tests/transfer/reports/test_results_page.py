@@ -112,8 +112,7 @@ def compared():
 def test_each_verdict_comes_out_again_by_scipy_alone(name, reference):
     head, trials = hours_of(name)
     names = [row["name"] for row in head["rows"] if row["name"] != reference]
-    lines = []
-    cells = {row: [] for row in names}
+    cells: dict[str, list[str]] = {row: [] for row in names}
     for measure in ("target", "total"):
         found = [by_hand(head, trials, reference, row, measure) for row in names]
         for row, one, p in zip(
