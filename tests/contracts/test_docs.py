@@ -1,0 +1,66 @@
+"""What the documentation promises: links lead somewhere, and tutorials run as written."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted(
+    page
+    for pattern in ("*.md", ".github/**/*.md", "msgs/*.md", "src/*/README.md", "src/*/docs/*.md")
+    for page in ROOT.glob(pattern)
+)
+TUTORIALS = [
+    "src/keepaway_transfer/docs/tutorial.md",
+    "src/keepaway_agent/docs/write_an_agent.md",
+]
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as the usual hosts make them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.M)
+    words = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {word.replace(" ", "-") for word in words}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+    broken = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        if "://" in link or link.startswith("mailto:"):
+            continue
+        wants_heading = anchor and target.suffix == ".md"
+        if not target.exists() or (wants_heading and anchor not in anchors(target)):
+            broken.append(link)
+    assert not broken
+
+
+@pytest.mark.parametrize("tutorial", TUTORIALS)
+@pytest.mark.xdist_group("ros")
+@pytest.mark.timeout(900)
+def test_a_tutorial_runs_as_written(tutorial: str, tmp_path: Path, ros_domain: int) -> None:
+    for name in ("scripts", "src", ".venv"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    blocks = re.findall(r"^```sh\n(.*?)^```", (ROOT / tutorial).read_text(), re.M | re.S)
+    assert len(blocks) >= 3
+    environment = os.environ | {"ROS_DOMAIN_ID": str(ros_domain)}
+    for block in blocks:
+        done = subprocess.run(
+            ["bash", "-ec", block],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
