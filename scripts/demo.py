@@ -42,7 +42,7 @@ from keepaway_transfer.rho import Transfer, transferred
 from keepaway_transfer.studies.processes import WorkerExecutor
 
 SCRIPTS = Path(__file__).resolve().parent
-DOMAIN = 97  # the demo's own, unless one is set: it hears no other match
+DOMAIN = 97  # the demo's own, unless one is set: it receives no other match
 THRESHOLD = 9.0  # [s] the paper's for 4v3
 CYCLES_PER_HOUR = 36000
 PROGRESS_EVERY = 10.0  # [s]

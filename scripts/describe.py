@@ -48,7 +48,9 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("weights", type=Path, nargs="+", help="weights files")
     parser.add_argument("--draw", type=Path, metavar="DIR", help="folder for the pictures")
-    parser.add_argument("--json", action="store_true", help="what a file says of itself")
+    parser.add_argument(
+        "--json", action="store_true", help="what a file contains beside the weights"
+    )
     return parser.parse_args()
 
 

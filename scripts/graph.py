@@ -1,4 +1,4 @@
-"""Show who is there and what is said: nodes, topics, services of the ROS graph, as it is now.
+"""Show nodes, topics and services of the ROS graph, as it is now.
 
     .venv/bin/python scripts/graph.py
     .venv/bin/python scripts/graph.py --domain 7 --topic /keeper_1/perception --count 3
@@ -45,7 +45,7 @@ def main() -> int:
 
 
 def discover(node: Node, quiet: float) -> None:
-    """Wait until nobody and nothing new has turned up for so long [s]."""
+    """Wait until nothing new has turned up for `quiet` seconds."""
     found, since = -1, time.monotonic()
     while time.monotonic() - since < quiet:
         names, topics = node.get_node_names_and_namespaces(), node.get_topic_names_and_types()
@@ -104,10 +104,10 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("--domain", type=int, help="ROS domain (default: the environment's)")
     parser.add_argument(
-        "--wait", type=float, default=3.5, help="until nobody new has come for so long [s]"
+        "--wait", type=float, default=3.5, help="until no new node has come for this time [s]"
     )
     parser.add_argument("--all", action="store_true", help="what every node has, too")
-    parser.add_argument("--topic", help="print what is said on this topic instead")
+    parser.add_argument("--topic", help="print what is published on this topic instead")
     parser.add_argument("--count", type=int, default=1, help="messages to print (default 1)")
     return parser.parse_args()
 

@@ -42,8 +42,8 @@ from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
 
 SCRIPTS = Path(__file__).resolve().parent
-START_TIMEOUT = 300.0  # [s] for everybody to come; so much because a first start compiles
-END_TIMEOUT = 15.0  # [s] for everybody to save and end
+START_TIMEOUT = 300.0  # [s] for all nodes to come; long because a first start compiles
+END_TIMEOUT = 15.0  # [s] for all nodes to save and end
 MATCH_OPTIONS = (
     *("task", "field", "seed", "speed", "episodes", "answer_timeout"),
     *("record", "wait_for_recorder", "force"),
@@ -185,7 +185,7 @@ def check_files(args: argparse.Namespace) -> None:
     if args.save_weights and not args.resume and list(args.save_weights.glob("*.npz")):
         raise MatchError(
             f"--save-weights {args.save_weights} has weights already: name another folder, or"
-            " --resume to go on from them"
+            " --resume to continue from them"
         )
 
 
@@ -252,7 +252,7 @@ def play_in_processes(
 
 
 def hear_all(executor: Executor) -> None:
-    """Take in what has been said."""
+    """Take in what has been published."""
     for _ in range(MOST_UNHEARD):
         executor.spin_once(0.0)
 
@@ -270,7 +270,7 @@ def judge_end(name: str, code: int, board: Scoreboard, restart: bool) -> None:
 
 
 def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str]:
-    """The parameters with which a node that was killed goes on where it was."""
+    """The parameters with which a node that was killed resumes where it was."""
     if name != "simulator":
         return ["-p", "resume:=true"]
     first = ["-p", f"first_episode:={board.next_episode}"]
@@ -320,7 +320,7 @@ def parse() -> argparse.Namespace:
     add("--save-weights", type=Path, metavar="DIR", help="where learners write NAME.npz")
     add("--save-every", type=int, default=100, help="and how often, in episodes (default 100)")
     add("--load-weights", type=Path, metavar="PATH", help="file, or DIR with NAME.npz")
-    add("--resume", action="store_true", help="go on from the weights in --save-weights")
+    add("--resume", action="store_true", help="resume from the weights in --save-weights")
     add("--restart", action="store_true", help="start nodes that were killed again where they were")
     add("--keeper-agent", metavar="COMMAND", help="started for each keeper instead of ours")
     add("--taker-agent", metavar="COMMAND", help="started for each taker instead of ours")

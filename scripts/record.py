@@ -3,8 +3,8 @@
     .venv/bin/python scripts/record.py out/bag
     .venv/bin/python scripts/record.py out/bag --compression lz4 --ros-args -r __ns:=/match_2
 
-It ends with 1 if a cycle is missing, and says of which topic; in a match that was on before, from
-when it has heard everybody. (To record at full speed let the simulator write the bag:
+It ends with 1 if a cycle is missing, and names the topic; in a match that was running before, from
+when it has received from every node. (To record at full speed let the simulator write the bag:
 scripts/match.py --record.) What follows --ros-args goes to the node.
 """
 

@@ -56,7 +56,7 @@ def main() -> int:
 
             count = replayer.play(spin_and_obey)
             replayer.linger()
-        print(f"said {count} messages")
+        print(f"published {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
         print(f"replay: {error}", file=sys.stderr)
         return 1

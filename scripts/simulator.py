@@ -1,4 +1,4 @@
-"""Start the simulator's node: it says what is played and waits for the players.
+"""Start the simulator's node: it publishes what is played and waits for the players.
 
     .venv/bin/python scripts/simulator.py --task 3v2 --seed 7 --speed 1
     .venv/bin/python scripts/simulator.py --visible-angle-deg 90 --ros-args -r __ns:=/match_2

@@ -49,7 +49,7 @@ def main() -> int:
         with Interruption() as interruption:
             return _run(study, arguments, interruption)
     except Stopped as stopped:
-        print(f"study: stopped; go on with --resume --out {arguments.out}", file=sys.stderr)
+        print(f"study: stopped; continue with --resume --out {arguments.out}", file=sys.stderr)
         return stopped.code
     except (AgentError, KeepawayError, OSError) as error:
         print(f"study: {error}", file=sys.stderr)
@@ -113,7 +113,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--scheduler", help="address of a Dask scheduler, instead of processes")
     parser.add_argument("--batch", type=int, default=25, help="trials played together")
-    parser.add_argument("--resume", action="store_true", help="go on with results that are there")
+    parser.add_argument("--resume", action="store_true", help="continue with existing results")
     parser.add_argument("--any-code", action="store_true", help="also if the code has changed")
     return parser.parse_args()
 

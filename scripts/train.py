@@ -42,7 +42,7 @@ from keepaway_sim.task import Outcome
 from keepaway_sim.world.config import CYCLE_TIME
 
 LAST = 1000
-"""Episodes at the end of a trial whose mean says how good it has become."""
+"""Episodes at the end of a trial whose mean shows how good it has become."""
 
 Episodes = dict[int, tuple[np.ndarray, np.ndarray]]  # durations [cycles], outcomes by trial
 
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace, interruption: Interruption) -> int:
     asked = {k: episodes[k] for k in range(arguments.trials) if k in episodes}
     report(training, asked, rate, folder, arguments)
     if code:
-        ways_on = "the same command goes on from here" if folder else "nothing was to be saved"
+        ways_on = "the same command continues from here" if folder else "nothing was to be saved"
         print(f"train: stopped; {ways_on}", file=sys.stderr)
     return code
 
@@ -254,7 +254,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--fields", type=int, default=NUM_FIELDS, help="side by side in a process")
     parser.add_argument("--record", type=Path, metavar="BAG", help="of the first trial")
     parser.add_argument("--record-episodes", metavar="NUMBERS", help="only these, like 0-9,500")
-    parser.add_argument("--any-code", action="store_true", help="go on though the code has changed")
+    parser.add_argument(
+        "--any-code", action="store_true", help="resume though the code has changed"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object on the last line")
     add_options(parser, Training)
     arguments = parser.parse_args()

@@ -30,7 +30,7 @@ import pymunk.batch
 HERE = Path(__file__).resolve().parent
 SCRIPTS = HERE.parent
 PARTS = ("world", "compile", "processes", "ros")
-DOMAIN = 93  # of the ROS part, so that it hears no match
+DOMAIN = 93  # of the ROS part, so that it receives no match
 
 
 def main() -> int:
@@ -184,7 +184,7 @@ def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
 
 
 def measure_compile(_: argparse.Namespace) -> dict[str, float]:
-    """Seconds until a first short training is over, machine code cached or not."""
+    """Seconds until a first short training has finished, machine code cached or not."""
     command = [sys.executable, __file__, "--only", "world", "--cycles", "10", "--json"]
     code = (
         "import time; start = time.monotonic()\n"

@@ -29,7 +29,7 @@ PERIOD = 5.0  # [s] between samples
 WARM_UP = 0.25  # of the time, before growth is looked for
 MOST_GROWTH = 8.0  # [MB] from then on; the counts of episodes are kept in memory
 MOST_HANDLES = 2  # file descriptors and threads that may come and go
-PATIENCE = 300.0  # [s] for the match to begin (a first start compiles), and for everybody to end
+PATIENCE = 300.0  # [s] for the match to begin (a first start compiles), and for all to end
 MEGABYTE = 2**20
 
 

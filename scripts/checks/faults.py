@@ -1,4 +1,4 @@
-"""Kill and freeze a match's nodes at random moments; check that it goes on and nothing is lost.
+"""Kill and freeze a match's nodes at random moments; check that it continues and nothing is lost.
 
     .venv/bin/python scripts/faults.py --faults 300
 
@@ -8,7 +8,7 @@ while. `match.py --restart` starts again what was killed. What must hold all the
 - episodes are counted without a gap, and none twice;
 - every weights file can be read, and never knows fewer episodes than before;
 - every bag can be read, and holds only episodes that were played;
-- whoever lives plays again within a minute.
+- every player that lives plays again within a minute.
 
 Ends with code 1 and the reason where one of these does not hold.
 """
@@ -39,11 +39,11 @@ from keepaway_sim.bags.repair import repair
 from keepaway_sim.ros.publishing import ALL, QUEUE
 
 SCRIPTS = Path(__file__).resolve().parents[1]
-PATIENCE = 300.0  # [s] for the match to begin, to go on after a fault, and to end
-RETURN = 60.0  # [s] in which a player that lives is heard again, or started again
+PATIENCE = 300.0  # [s] for the match to begin, to continue after a fault, and to end
+RETURN = 60.0  # [s] in which a player that lives answers again, or started again
 LONGEST_FREEZE = 3.0  # [s]
-FAULTS_AN_EPISODE = 5  # at most: where nobody ever gets to play, nothing is tried
-FAULTS_A_PAUSE = 25  # after so many, everybody must come back
+FAULTS_AN_EPISODE = 5  # at most: where no player ever gets to play, nothing is tried
+FAULTS_A_PAUSE = 25  # after this many, every player must come back
 
 
 class LossError(RuntimeError):
@@ -54,9 +54,9 @@ class Witness(Node):
     """Counts what a match says of itself.
 
     Attributes:
-        numbers: of the episodes that ended, as they were heard.
+        numbers: of the episodes that ended, as they were received.
         missing: how often each player was newly declared missing.
-        absent: who is missing, as last heard; None if nothing was heard yet.
+        absent: who is missing, as last received; None before that.
     """
 
     def __init__(self) -> None:
@@ -162,14 +162,14 @@ class Match:
 
 
 def main() -> int:
-    """Play, hurt, check, tell."""
+    """Play, inject faults, check, report."""
     args = parse()
     os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init()
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         match = Match(Path(folder), args.task, args.seed)
         try:
-            report = torture(match, args, Path(folder))
+            report = inject_faults(match, args, Path(folder))
         except LossError as loss:
             print(f"faults: LOST: {loss}", file=sys.stderr)
             print(Path(folder, "stderr.txt").read_text()[-3000:], file=sys.stderr)
@@ -183,7 +183,7 @@ def main() -> int:
     return 0
 
 
-def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, object]:
+def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, object]:
     """One fault after the other, everything checked after each; then the end of the match."""
     random = np.random.default_rng(args.seed)
     witness, executor = Witness(), EventsExecutor()
@@ -193,7 +193,7 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
     started = time.monotonic()
     for number in range(args.faults):
         listen(executor, float(random.exponential(args.period)))
-        fault = hurt(match, random, executor, args)
+        fault = inject_fault(match, random, executor, args)
         faults[fault] += 1
         if fault == "simulator killed" or number % FAULTS_AN_EPISODE == 0:
             wait_for_episodes(executor, witness, 1)
@@ -209,7 +209,7 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
     match.check_weights()
     bags, recorded = match.check_bags(folder, set(witness.numbers))
     if summary["episodes"] != len(witness.numbers):
-        raise LossError(f"{len(witness.numbers)} episodes heard, {summary['episodes']} told")
+        raise LossError(f"{len(witness.numbers)} episodes received, {summary['episodes']} reported")
     return {
         "faults": dict(sorted(faults.items())),
         "seconds": round(time.monotonic() - started),
@@ -221,7 +221,7 @@ def torture(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, o
     }
 
 
-def hurt(
+def inject_fault(
     match: Match, random: np.random.Generator, executor: Executor, args: argparse.Namespace
 ) -> str:
     """Kill or freeze one node; what was done, in words."""
@@ -241,10 +241,10 @@ def hurt(
 
 
 def wait_for_episodes(executor: Executor, witness: Witness, more: int) -> None:
-    """Wait until so many more have ended.
+    """Wait until `count` more have ended.
 
     Raises:
-        LossError: the match does not go on.
+        LossError: the match does not continue.
     """
     wanted, until = len(witness.numbers) + more, time.monotonic() + PATIENCE
     while len(witness.numbers) < wanted:
@@ -254,10 +254,10 @@ def wait_for_episodes(executor: Executor, witness: Witness, more: int) -> None:
 
 
 def wait_for_everybody(executor: Executor, witness: Witness) -> None:
-    """Wait until nobody is missing.
+    """Wait until no player is missing.
 
     Raises:
-        LossError: somebody does not come back.
+        LossError: a player does not come back.
     """
     witness.absent, until = None, time.monotonic() + RETURN
     while witness.absent is None or witness.absent:

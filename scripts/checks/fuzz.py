@@ -290,7 +290,7 @@ def requests() -> list[bytes]:
 
 
 def request_taker(world: World) -> Callable[[bytes], object]:
-    """Takes a request in a match that goes on; whatever is then played, the world can play."""
+    """Takes a request in a match that is running; whatever is then played, the world can play."""
     roster = Roster(world.task, world.config)
     for player in range(world.task.num_players):
         roster.take_seat(player, b"own")

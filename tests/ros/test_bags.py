@@ -80,7 +80,7 @@ def test_a_replay_says_byte_for_byte_what_was_recorded(
     with recording(tmp_path / "again") as recorder:
         said = replay(bag, "--rate", rate, "--wait-for-subscribers", "14", "--start-delay", "1")
     assert recorder.returncode == 0
-    assert said == f"said {BagReader(bag).message_count} messages\n"
+    assert said == f"published {BagReader(bag).message_count} messages\n"
     assert by_topic(tmp_path / "again") == by_topic(bag)
     info = BagReader(tmp_path / "again").info
     assert info["gaps"].startswith("nothing is missing")

@@ -81,7 +81,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, c
     assert "resource_tracker" not in said
     if code > 0:
         last = said.splitlines()[-1]
-        assert last == f"study: stopped; go on with --resume --out {log.parent}"
+        assert last == f"study: stopped; continue with --resume --out {log.parent}"
     assert psutil.wait_procs(workers, timeout=900)[1] == []  # none is left behind
     before = len(trials_in(log.parent))
     done = study(*arguments, "--resume")
@@ -108,7 +108,7 @@ def test_a_worker_that_is_killed_is_replaced_and_the_study_ends_with_the_same(wh
 def test_results_in_the_way_are_refused_in_one_line(whole):
     done = study("--out", whole[0])
     assert done.returncode == 1
-    assert "add --resume to go on, or name another folder" in done.stderr
+    assert "add --resume to continue, or name another folder" in done.stderr
 
 
 def test_two_processes_give_the_same_results(whole, tmp_path):

@@ -2,7 +2,7 @@
 
 A file is written beside its place, under a hidden name that ends in `.tmp`, and moved there once it
 is on the disk: a writer that is killed leaves the old file or the new one, never half of one. A
-file that cannot be moved into its place stays beside it, and the error says where.
+file that cannot be moved into its place stays beside it, and the error names that place.
 """
 
 import contextlib

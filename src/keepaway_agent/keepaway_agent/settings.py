@@ -3,8 +3,8 @@
 A group of settings is a frozen attrs class whose fields are made by `setting`. From the declaration
 come the check of every value when an instance is made, the options of command lines
 (`keepaway_sim.cli.options`), the parameters of ROS nodes (`parameters.py` of each package) and the
-tables of the documentation (`table`). A group may hold other groups (`group`); whoever knows a
-setting by its name alone, as a command line or a file does, sees one flat list.
+tables of the documentation (`table`). A group may hold other groups (`group`); a
+command line or a file, which knows a setting by its name alone, sees one flat list.
 
 >>> @attrs.frozen
 ... class Pace:

@@ -230,7 +230,7 @@ def test_a_training_stopped_by_ctrl_c_goes_on_where_it_was(tmp_path):
         os.kill(stopped.pid, signal.SIGINT)
         _, said = stopped.communicate(timeout=900)
     assert stopped.returncode == 130
-    assert b"the same command goes on" in said
+    assert b"the same command continues" in said
     finished = {path: path.stat().st_mtime_ns for path in out.glob("trial_*")}
     assert 1 <= len(finished) < 6
     again = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -116,7 +116,7 @@ def test_a_signal_ends_a_training_with_what_is_finished_saved(tmp_path, signals,
         _, said = stopped.communicate(timeout=900)
     assert stopped.returncode == code
     assert said.decode().splitlines()[-1:] == [
-        "train: stopped; the same command goes on from here"
+        "train: stopped; the same command continues from here"
     ], said.decode()
     assert "Traceback" not in said.decode()
     assert "resource_tracker" not in said.decode()

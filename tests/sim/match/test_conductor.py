@@ -235,7 +235,7 @@ def test_the_match_waits_for_a_recorder_that_is_behind_but_not_for_ever() -> Non
     assert "waits for a recorder" in stage.reports
     stage.match.take_recorded(struct.pack("<4xiI", 0, 0), b"it")
     stage.play(until=lambda: stage.match.num_cycles >= 60)
-    assert "a recorder is missing: the match goes on without it" in stage.reports
+    assert "a recorder timed out: the match continues without it" in stage.reports
 
 
 def test_messages_that_cannot_be_are_counted_and_warned_of_once() -> None:

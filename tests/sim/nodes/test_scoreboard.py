@@ -39,8 +39,8 @@ def test_a_file_gets_lines(context: rclpy.Context) -> None:
     board = Scoreboard(4, out=out, context=context)
     play(board, 3)
     first, last = out.getvalue().splitlines()
-    assert first == "1 episodes, last 1 held 5.00 s, no simulator was heard"
-    assert last == "3 episodes, last 3 held 5.00 s, no simulator was heard"
+    assert first == "1 episodes, last 1 held 5.00 s, no simulator was found"
+    assert last == "3 episodes, last 3 held 5.00 s, no simulator was found"
 
 
 def test_a_terminal_gets_one_bar(context: rclpy.Context) -> None:

@@ -71,7 +71,7 @@ def test_half_a_line_of_a_killed_writer_is_cut_off(tmp_path):
 
 def test_results_are_not_touched_without_resume(tmp_path):
     append(tmp_path, 0)
-    with pytest.raises(StudyError, match="add --resume to go on, or name another folder"):
+    with pytest.raises(StudyError, match="add --resume to continue, or name another folder"):
         append(tmp_path, 1)
     assert len(read_results(tmp_path).records) == 1
 

@@ -1,8 +1,8 @@
-"""Does an agent keep to the contract? What a simulator says to it, and a judge of its answers.
+"""Does an agent keep to the contract? What a simulator sends to it, and a judge of its answers.
 
 The sentences are those of `docs/agent_contract.md`. The script is plain data: steps made from the
 random numbers of a seed, which know nothing of the world's rules. `nodes/scripted_simulator.py`
-says them to an agent and keeps a log; `judge` makes verdicts of the log.
+sends them to an agent and keeps a log; `judge` makes verdicts of the log.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PAUSE: Final = 3.0  # [s] of wall time
 MOST_ACTION_VALUES: Final = 64
 CDR_HEADER: Final = b"\x00\x01\x00\x00"
 """Of every message. What begins otherwise an agent's middleware may refuse by itself; it then goes
-on asking for it, and nothing that is said later arrives."""
+on asking for it, and nothing that is published later arrives."""
 
 READY: Final = "is ready"
 ASKED: Final = "speaks when asked"
@@ -31,12 +31,12 @@ LEAVES: Final = "leaves cleanly"
 CHAPTERS: Final = {
     "answers": "answers every perception whose decision is due",
     "repeated": "answers again when a perception comes again",
-    "reset": "goes on after episodes that were aborted",
-    "lost end": "goes on when the end of an episode was never perceived",
-    "unseen": "answers when it has never perceived anybody else",
-    "pause": f"is silent in a pause of {PAUSE:.0f} s and goes on after it",
-    "clock": "goes on when stamps jump an hour ahead and back to 0",
-    "garbage": "outlives perceptions that are none and goes on",
+    "reset": "continues after episodes that were aborted",
+    "lost end": "continues when the end of an episode was never perceived",
+    "unseen": "answers when it has never perceived another player",
+    "pause": f"is silent in a pause of {PAUSE:.0f} s and continues after it",
+    "clock": "continues when stamps jump an hour ahead and back to 0",
+    "garbage": "survives malformed perceptions and continues",
     "new match": "plays on in a new match, from episode 0",
     "new size": "takes its place in a new match of another size",
 }
@@ -86,7 +86,7 @@ class Garbage(NamedTuple):
 
 
 class Pause(NamedTuple):
-    """Nothing is said for so many seconds."""
+    """Nothing is published for `seconds` seconds."""
 
     seconds: float
 
@@ -107,16 +107,16 @@ class Request(NamedTuple):
 
 @dataclass
 class Exchange:
-    """A step, and what the agent said until the next one."""
+    """A step, and what the agent published until the next one."""
 
     step: Step
     requests: list[Request | None] = field(default_factory=list)  # None: bytes that are none
-    ready: bool = False  # a Match: it said that it is, with its name and index
+    ready: bool = False  # a Match: it reported that it is, with its name and index
     answer_time: float | None = None  # [s] a due Shown: until the first right answer
 
 
 def script(name: str, seed: int = 0, one_size: bool = False) -> Iterator[Step]:
-    """What the scripted simulator says to the agent called `name`, chapter by chapter.
+    """What the scripted simulator sends to the agent called `name`, chapter by chapter.
 
     Args:
         name: of a player of 3v2.
@@ -157,7 +157,7 @@ def script(name: str, seed: int = 0, one_size: bool = False) -> Iterator[Step]:
 
 
 class _Scenes:
-    """Episodes as one player may perceive them: everybody wanders about."""
+    """Episodes as one player may perceive them: all players wander about."""
 
     def __init__(self, match: ScriptedMatch, player: int, rng: np.random.Generator) -> None:
         self.now = 0.0  # [s] simulated
@@ -171,7 +171,7 @@ class _Scenes:
         outcome: Outcome = Outcome.TAKEN_AWAY,
         unseen: bool = False,
     ) -> Iterator[Shown]:
-        """An episode's perceptions, the last of which says how it ended."""
+        """An episode's perceptions, the last of which has how it ended."""
         position = self._rng.uniform(-0.4, 0.4, (self.num_players + 1, 2)) * FIELD_SIZE
         number, self._number = self._number, self._number + 1
         for cycle in range(num_cycles + 1):
@@ -205,7 +205,7 @@ class _Scenes:
         )
 
     def _blinded(self, shown: Shown) -> Shown:
-        """The same for one who has perceived nobody but itself."""
+        """The same for a player that has perceived only itself."""
         own = np.arange(self.num_players + 1) == self._player
         return replace(
             shown,

@@ -1,6 +1,6 @@
 """Would the players of a recorded match decide the same again? Needs the recording, and no ROS.
 
-Every player is made anew as the bag says it was (policy, seed, weights it began with), is shown
+Every player is made anew as the bag describes it (policy, seed, weights it began with), is shown
 what was recorded as its perceptions, and must ask for what was recorded as its requests. So a
 player that learns is checked to have learned the same.
 """
@@ -24,7 +24,7 @@ def check_decisions(bag: MatchBag) -> Checked:
 
     Raises:
         KeepawayError: the bag does not say who played, or has gaps.
-        AgentError: it says something that no player can be.
+        AgentError: it describes something that no player can be.
     """
     agents = recorded_agents(bag)
     episodes = compared = 0
@@ -43,11 +43,11 @@ def check_decisions(bag: MatchBag) -> Checked:
 
 
 def recorded_agents(bag: MatchBag) -> dict[int, Agent]:
-    """The players of a bag as they were when the match began, by index; strangers are left out.
+    """The players of a bag as they were when the match began, by index; not foreign agents.
 
     Raises:
         KeepawayError: the bag does not say who played.
-        AgentError: it says something that no player can be.
+        AgentError: it describes something that no player can be.
     """
     if "agents" not in bag.reader.info:
         raise KeepawayError(f"{bag.reader.path} does not say who played (no info 'agents')")

@@ -61,7 +61,7 @@ def judge(log: Sequence[Exchange], name: str, exit_code: int | None) -> list[Ver
     return [
         Verdict(
             READY,
-            "says that it is ready for every match, with its own name and index",
+            "reports that it is ready for every match, with its own name and index",
             all(said),
             f"{sum(said)} of {len(said)} matches",
         ),
@@ -111,7 +111,7 @@ def _judge_chapter(log: Sequence[Exchange], chapter: str) -> Verdict:
     holds = num_answered == len(due)
     if chapter == "pause":
         spoken = sum(len(each.requests) for each in log if isinstance(each.step, Pause))
-        holds, evidence = holds and not spoken, f"{evidence}, {spoken} said in the pause"
+        holds, evidence = holds and not spoken, f"{evidence}, {spoken} published in the pause"
     return Verdict(chapter, CHAPTERS[chapter], holds, evidence)
 
 
@@ -132,7 +132,7 @@ def _judge_requests(log: Sequence[Exchange], name: str) -> Verdict:
                 wrong.append(f"player_index {request.player}, not {index}")
             elif (request.episode, request.cycle) not in moments:
                 wrong.append(f"episode {request.episode} cycle {request.cycle} was not due")
-    return _verdict(ASKED, "says only answers to what was due, in its own name", total, wrong)
+    return _verdict(ASKED, "publishes only answers to what was due, in its own name", total, wrong)
 
 
 def _judge_legality(log: Sequence[Exchange]) -> Verdict:

@@ -87,5 +87,5 @@ class KeepersAECEnv(AECEnv[str, np.ndarray, int]):
         self._fields.step(np.ones(1, dtype=np.bool_))
 
     def _select(self) -> None:
-        """The first keeper in match order that has a choice; at the end, whoever is first."""
+        """The first keeper in match order that has a choice; at the end, the first in the list."""
         self.agent_selection = self.possible_agents[int(self._fields.choosing[0].argmax())]

@@ -49,7 +49,7 @@ class Fields:
             ordering: what ranks players, ball or k1.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         self.task = Task.parse(task)
         self._world = World(self.task, config or Config(), num_fields)
@@ -130,7 +130,7 @@ class Fields:
         rank_players(position, num_keepers, keeper, -1, self._ordering, self._deciders.order)
 
     def _look(self, moved: np.ndarray) -> None:
-        """Let everybody answer by rule where time went by, and find out who has a choice."""
+        """Let every player answer by rule where time went by, and find out who has a choice."""
         self._streams.refill()
         self._decide_all(moved)
         self.choosing[moved] = self._deciders.chose[moved, : self.task.num_keepers]

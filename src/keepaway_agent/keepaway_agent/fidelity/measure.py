@@ -106,7 +106,7 @@ def summarize(trajectories: Trajectories, task: str) -> dict[str, Any]:
 
 
 def training(cell: Cell, episodes: int) -> Training:
-    """Trials of so many episodes in which a cell's keepers play."""
+    """Trials of `episodes` episodes in which a cell's keepers play."""
     return Training(
         task=cell.task,
         profile=cell.profile,
@@ -118,7 +118,7 @@ def training(cell: Cell, episodes: int) -> Training:
 
 
 def measure(cell: Cell, episodes: int, num_fields: int = 64) -> Measured:
-    """Play a cell for at least so many episodes, as many on every field."""
+    """Play a cell for at least `episodes` episodes, equally many on every field."""
     trials = training(cell, math.ceil(episodes / num_fields))
     results = list(play_trials(trials, range(num_fields), num_fields=num_fields))
     cycles = np.concatenate([result.durations for result in results])

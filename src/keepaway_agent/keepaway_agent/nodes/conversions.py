@@ -32,7 +32,7 @@ def match_facts(message: Match) -> MatchFacts:
     """What a player must know of a match.
 
     Raises:
-        AgentError: a match in which nobody can play.
+        AgentError: a match that cannot be played.
     """
     if message.num_keepers < 2 or message.num_takers < 1:
         raise AgentError(f"a match of {message.num_keepers} keepers v {message.num_takers} takers")

@@ -2,7 +2,7 @@
 
 A parameter is read as its declaration wants it: a whole number where a floating-point one is
 declared, a number where a text is (`profile:=2005`), a value under a name that the setting had
-before. What lies outside the range is refused in one line that says what may be given.
+before. What lies outside the range is refused in one line with what may be given.
 
 The packages of the world and of the agents share no code, so each has this same file; a contract
 test holds the two together.
@@ -101,7 +101,7 @@ def _declare(node: Node, declared: Setting, default: Any, read_only: bool) -> An
 def _given(node: Node, name: str) -> Any:
     """What was given for a parameter when the node was started, of whatever type; else None.
 
-    rclpy shows it to nobody who does not declare the parameter.
+    rclpy shows it only to a node that declares the parameter.
     """
     value = node.declare_parameter(name, None, ParameterDescriptor(dynamic_typing=True)).value
     node.undeclare_parameter(name)

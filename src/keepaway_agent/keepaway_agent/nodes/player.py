@@ -1,7 +1,7 @@
 """The node of one player, keeper or taker: wiring around `agent.Agent`.
 
 The node's name is the player's name, "keeper_1"; its topics and services begin with it. It learns
-from the latched `match` what is played, says on its `status` that it is ready until the first
+from the latched `match` what is played, reports on its `status` that it is ready until the first
 perception comes, and answers perceptions.
 """
 
@@ -84,7 +84,7 @@ class PlayerNode(Node):
         self._reconsidering.cancel()  # until there is another match
 
     def save(self) -> None:
-        """Write what it has learned, where the parameter `save_weights` says so.
+        """Write what it has learned, to the file of the parameter `save_weights`, if it is set.
 
         Raises:
             WeightsError: the file cannot be written.
@@ -102,10 +102,10 @@ class PlayerNode(Node):
         own = self._weights_path
         if own is None or not own.exists():
             if own and files.resume:
-                self.get_logger().warning(f"resume: there is no {own} to go on from")
+                self.get_logger().warning(f"resume: there is no {own} to resume from")
             return load_weights(Path(files.load_weights)) if files.load_weights else None
         if not files.resume:
-            raise AgentError(f"save_weights={own}: is there already; resume:=true goes on from it")
+            raise AgentError(f"save_weights={own}: exists already; resume:=true resumes from it")
         return load_weights(own)
 
     def _on_match(self, match: Match) -> None:
@@ -236,7 +236,7 @@ class PlayerNode(Node):
             response.message = str(error)
             return response
         response.success, response.path = True, str(path)
-        response.message = f"{self.get_name()} goes on from them"
+        response.message = f"{self.get_name()} continues from them"
         return response
 
 

@@ -19,7 +19,7 @@ from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 
 QUEUE = QoSProfile(depth=200)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-RESEND_PERIOD = 0.25  # [s] an unanswered perception is said again, as the simulator does
+RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again, as the simulator does
 SILENCE = 0.02  # [s] to listen where no answer is due
 READY_PATIENCE = 300.0  # [s] for an agent to start, some of which compile
 
@@ -31,7 +31,7 @@ class ScriptedSimulator(Node):
     """Says a script's steps to one agent.
 
     Attributes:
-        log: an `Exchange` for every step said so far.
+        log: an `Exchange` for every step sent so far.
     """
 
     def __init__(self, name: str, **node_options: Any) -> None:

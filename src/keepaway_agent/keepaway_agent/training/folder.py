@@ -41,13 +41,13 @@ class TrainingFolder:
     def __init__(
         self, path: Path, training: Training, command: str = "", any_code: bool = False
     ) -> None:
-        """Begin a folder, or go on with the one that is there.
+        """Begin a folder, or resume the existing one.
 
         Args:
             path: where; made if it is missing.
             training: whose results it holds.
             command: that makes them, for the record.
-            any_code: go on also if another version of the code began it.
+            any_code: resume also if another version of the code began it.
 
         Raises:
             AgentError: a folder of something else, or of other settings or another version.

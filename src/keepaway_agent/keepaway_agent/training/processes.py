@@ -1,7 +1,7 @@
 """Worker processes that may die at any moment: each has a pipe of its own, nothing is shared.
 
-A process that is killed takes no lock with it that others wait for, and its pipe ends: whoever
-reads it knows at once. There is no shared memory or semaphore that could be left behind.
+A process that is killed takes no lock with it that others wait for, and its pipe ends: the
+reader knows at once. There is no shared memory or semaphore that could be left behind.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def how_it_ended(code: int) -> str:
 
 def _run(target: Callable[..., None], pipe: Connection, *arguments: Any) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with contextlib.suppress(BrokenPipeError):  # nobody wants to know any more
+    with contextlib.suppress(BrokenPipeError):  # the other end has closed
         target(pipe, *arguments)
 
 

@@ -3,8 +3,8 @@
 A folder of results holds `training.json` (settings, command, code version) and a folder for each
 finished trial: `trial_0003/` with `episodes.csv`, a line an episode, and a weights file for every
 player that learned. A trial's folder appears in one step when it is whole, so a training can be
-stopped at any moment, and the same training goes on with the trials that are missing. What the
-players of the first trial learned lies in the folder itself too, for whoever needs just a team.
+stopped at any moment, and the same training resumes with the trials that are missing. What the
+players of the first trial learned lies in the folder itself too, for programs that need a team.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Training:
 
     @property
     def stop(self) -> StopRule:
-        """When a trial is over."""
+        """When a trial ends."""
         cycles = round(self.hours / HOURS_PER_CYCLE)
         return StopRule(max_episodes=self.episodes, max_cycles=cycles or None)
 

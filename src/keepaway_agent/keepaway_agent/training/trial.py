@@ -44,7 +44,7 @@ class TrainerConfig:
 
 @dataclass(frozen=True)
 class StopRule:
-    """When a trial is over: at the first of these.
+    """When a trial ends: at the first of these.
 
     Raises:
         AgentError: a rule that never stops, or that makes no sense.
@@ -70,7 +70,7 @@ class Moment(NamedTuple):
 
     world: World
     field: int  # of the world, on which the trial is played
-    action: np.ndarray  # (num_players,) int64, what everybody asks for where a decision is due
+    action: np.ndarray  # (num_players,) int64, what each player asks for where a decision is due
     target: np.ndarray  # (num_players,) int64
     values: list[np.ndarray]  # what each player's learner expected; empty where none was asked
 

@@ -1,4 +1,4 @@
-"""Chosen episodes of a training, recorded while it goes on, as a bag like a match's. No ROS."""
+"""Chosen episodes of a training, recorded while it runs, as a bag like a match's. No ROS."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TrialRecorder:
             path: folder of the bag, that does not exist yet.
             seed: of the training.
             wanted: which episodes to record, by number; None: all.
-            info: what else the bag says of how it was made.
+            info: what else the bag contains about how it was made.
             attachments: files by name, for example the weights that players begin with.
         """
         self.path, self._seed, self._wanted = path, seed, wanted

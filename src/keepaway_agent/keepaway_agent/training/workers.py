@@ -40,7 +40,7 @@ def play_trials(
     watch: Watch | None = None,
     recorder: TrialRecorder | None = None,
 ) -> Generator[TrialResult, None, None]:
-    """Play trials, and give each one's result as soon as it is over; `label` is its number.
+    """Play trials, and give each one's result as soon as it has finished; `label` is its number.
 
     A process that is killed is noticed at once and replaced, and what it played is played again; a
     warning is logged that says so.

@@ -87,7 +87,7 @@ def losses_figure(losses: np.ndarray, task: Task) -> Figure:
 
 
 def actions_figure(actions: np.ndarray, task: Task) -> Figure:
-    """What players asked for, in shares: keepers with the ball, and everybody without it."""
+    """What players asked for, in shares: keepers with the ball, and every player without it."""
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     _draw_shares(left, actions, WITH_BALL, "With the ball", task)
@@ -120,7 +120,7 @@ def _draw_shares(
 
 
 def _dot(count: int) -> float:
-    """The size [points] of each of so many dots."""
+    """The size [points] of each dot, of this number of dots."""
     return float(np.clip(40 / np.sqrt(max(count, 1)), 1.5, 5.0))
 
 

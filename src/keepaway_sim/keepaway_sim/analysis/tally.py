@@ -60,7 +60,7 @@ class Tally:
 
 
 class _Partial:
-    """What is known so far of an episode that goes on."""
+    """What is known so far of an episode that is running."""
 
     __slots__ = ("ball", "decisions", "held", "holds", "passes", "states")
 

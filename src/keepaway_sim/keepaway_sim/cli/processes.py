@@ -1,8 +1,8 @@
 """Processes that belong together, as a match's nodes do: started, watched, ended as one. No ROS.
 
-Only processes that were started here are ever ended, by their ids. They do not hear the terminal's
-Ctrl-C, so that their starter decides in which order they end; and if the starter itself dies, the
-kernel tells them to end.
+Only processes that were started here are ever ended, by their ids. They do not receive the
+terminal's Ctrl-C, so their starter decides in which order they end; and if the starter itself dies,
+the kernel ends them (SIGTERM).
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Processes:
         return done
 
     def stop(self, names: Sequence[str], patience: float) -> list[str]:
-        """End some: ask (SIGTERM), wait so many seconds for all together, then kill.
+        """End some: ask (SIGTERM), wait `patience` seconds for all together, then kill.
 
         Returns:
             the names of those that had to be killed.

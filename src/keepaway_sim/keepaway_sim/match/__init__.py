@@ -1,1 +1,1 @@
-"""Who plays, how a match begins and goes on. Knows no ROS."""
+"""Who plays, how a match begins and continues. Knows no ROS."""

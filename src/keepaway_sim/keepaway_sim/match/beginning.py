@@ -20,8 +20,8 @@ def random_match_id() -> int:
 def begin_match(world: World, seed: int, first_episode: int = 0) -> None:
     """Kick off a match of nodes: field 0 of a world plays from `first_episode` on.
 
-    A match that goes on after its simulator died has random numbers of its own: they follow from
-    the seed and the number of the episode that it goes on with.
+    A match that continues after its simulator died has random numbers of its own: they follow from
+    the seed and the number of the episode that it continues with.
     """
     key = (*WORLD_KEY, first_episode) if first_episode else WORLD_KEY
     world.start(0, np.random.SeedSequence(seed, spawn_key=key))

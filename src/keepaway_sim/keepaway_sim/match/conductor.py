@@ -31,7 +31,7 @@ ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another on
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 
 Spin = Callable[[float], None]
-"""Handles the messages that have come, or waits for one at most so many seconds."""
+"""Handles the messages that have come, or waits for one at most that many seconds."""
 
 
 class Outlet(Protocol):
@@ -50,7 +50,7 @@ class Outlet(Protocol):
         """Whether anything subscribes to it."""
 
     def wait_until_received(self, topic: str, patience: float) -> None:
-        """Wait until all subscribers have what was published, at most so many seconds."""
+        """Wait until all subscribers have what was published, at most `patience` seconds."""
 
     def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
         """Record what another node published, if a bag is written."""
@@ -136,7 +136,7 @@ class Conductor:
         self._outlet.publish("match", self._messages.match(*played), 0)
 
     def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
-        """Play until all episodes have ended, or `is_told_to_end` says so.
+        """Play until all episodes have ended, or `is_told_to_end` is true.
 
         Raises:
             KeepawayError: another simulator was there before.
@@ -157,7 +157,7 @@ class Conductor:
             raise KeepawayError(self._refusal)
 
     def take_leave(self) -> None:
-        """After `play`: give everybody time to take in what was published last."""
+        """After `play`: give every subscriber time to take in what was published last."""
         if not self._has_begun:
             return
         until = self._clock() + FAREWELL
@@ -217,7 +217,7 @@ class Conductor:
             self._warn("recorded", f"recorded: ignored: {error}")
 
     def start(self) -> str:
-        """Play, or go on; what it does then, in words."""
+        """Start or resume; what it does then, in words."""
         self.is_running = True
         return f"waits for {self.missing()}" if self.missing() else "plays"
 
@@ -232,7 +232,7 @@ class Conductor:
         return "ends the episode and kicks off the next one"
 
     def missing(self) -> str:
-        """Names of those without whom it cannot go on: at first everybody, later anybody."""
+        """Players whom it waits for: before the match all, later any one."""
         if not self._has_begun:
             recorder = ["a recorder"] * self.recorders.is_missing(self.count_recorders())
             return ", ".join([*self.roster.absent, *recorder])
@@ -257,7 +257,7 @@ class Conductor:
         return 0 < self.settings.episodes <= self.num_finished
 
     def _can_play(self) -> bool:
-        """Is the match running, with somebody there to play it?"""
+        """Is the match running, with at least one player present?"""
         if not self.is_running:
             return False
         missing = self.missing()
@@ -279,7 +279,7 @@ class Conductor:
         while self.recorders.is_behind(self._messages.stamp_ns()) and not self._is_over():
             self._spin(RESEND_PERIOD)
             if self._clock() > until:
-                self._log.error("a recorder is missing: the match goes on without it")
+                self._log.error("a recorder timed out: the match continues without it")
                 self.recorders.time_out(self._messages.stamp_ns())
 
     # A cycle.
@@ -307,7 +307,7 @@ class Conductor:
             outlet.publish("markers", make.markers(), stamp)
 
     def _collect(self) -> None:
-        """Wait for the answers; unless in lock-step, until the cycle's time is over."""
+        """Wait for the answers; unless in lock-step, until the cycle's time has passed."""
         until = self._end_of_cycle()
         self._outlet.write_recorded()
         while self._is_collecting(until):
@@ -317,7 +317,7 @@ class Conductor:
                 self._remind(now)
 
     def _end_of_cycle(self) -> float:
-        """When the cycle's time is over [s, monotonic]; never in lock-step."""
+        """When the cycle's time has passed [s, monotonic]; never in lock-step."""
         if self.settings.speed == 0:
             return math.inf
         duration, now = CYCLE_TIME / self.settings.speed, self._clock()

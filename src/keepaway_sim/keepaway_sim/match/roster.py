@@ -1,6 +1,6 @@
 """Who plays, and whose answers are in: what a simulator knows of players it cannot trust. No ROS.
 
-Players are processes: they come late, die, freeze, come back, and anybody may send anything in
+Players are processes: they come late, die, freeze, come back, and any process may send anything in
 their name. A seat is *absent* until its player says that it is ready, then *present*: its answers
 are waited for. One that does not answer for `answer_timeout` is absent again and gets default
 actions; when it speaks again it is present from the next kick-off on.
@@ -39,7 +39,7 @@ class Seat:
     """
 
     name: str
-    holder: bytes = b""  # the process that plays it; nobody's while absent and not returning
+    holder: bytes = b""  # the process that plays it; empty while absent and not returning
     present: bool = False  # is waited for
     returning: bool = False  # absent, but has spoken: present from the next kick-off on
     data: bytes = b""  # this cycle's answer, empty while there is none
@@ -76,15 +76,15 @@ class Roster:
 
     @property
     def is_deserted(self) -> bool:
-        """Is nobody there, and nobody coming?"""
+        """Is no player present, and none returning?"""
         return not any(seat.present or seat.returning for seat in self.seats)
 
     def take_seat(self, player: int, sender: bytes = b"") -> None:
-        """A player says that it is ready: before the match it is present, later it returns.
+        """A player reports that it is ready: before the match it is present, later it returns.
 
         Args:
             player: its index.
-            sender: the process that says so.
+            sender: the process that reports it.
 
         Raises:
             KeepawayError: another process plays it.

@@ -1,8 +1,8 @@
-"""The recorder's node: what is said in a match, into a bag, with a count of what is missing.
+"""The recorder's node: what a match publishes, into a bag, with a count of what is missing.
 
 It does not spin: two hundred times a second it takes all that came from its subscriptions, as
 bytes. That costs a fraction of a callback for each message, and deep histories keep what comes in
-between. The simulator can wait for it: `recorded` says which simulated time it has reached.
+between. The simulator can wait for it: `recorded` has the simulated time that it has reached.
 """
 
 import json
@@ -47,9 +47,9 @@ from keepaway_sim.wire.messages import (
 
 POLL_PERIOD = 0.005  # [s]
 FLUSH_PERIOD = 1.0  # [s]
-QUIET = 0.3  # [s] nothing came for so long: all that was said has come
-LONGEST_FAREWELL = 5.0  # [s] a match that goes on is left after so long
-REPORT_STEP = 10 * CYCLE_NS  # whoever waits for it lets it be further behind than that
+QUIET = 0.3  # [s] nothing came for this long: all that was published has come
+LONGEST_LAST_WAIT = 5.0  # [s] a match that continues is left after this time
+REPORT_STEP = 10 * CYCLE_NS  # a simulator that waits for it lets it be further behind than that
 SAID_BY_THE_MATCH = {
     "/clock": CLOCK,
     "match": MATCH,
@@ -102,7 +102,7 @@ class Recorder(Node):
     """
 
     def __init__(self, **node_options: Any) -> None:
-        """Begin the bag and listen to the match; to its players once it has said who they are.
+        """Begin the bag and listen to the match; to its players once it has named them.
 
         Raises:
             KeepawayError: no path was given, or something is there.
@@ -153,7 +153,7 @@ class Recorder(Node):
         while time.monotonic() - quiet_since < QUIET:
             if self.poll():
                 quiet_since = time.monotonic()
-            if time.monotonic() - started > LONGEST_FAREWELL:
+            if time.monotonic() - started > LONGEST_LAST_WAIT:
                 break
             time.sleep(POLL_PERIOD)
         report = self.gaps.report()
@@ -189,7 +189,7 @@ class Recorder(Node):
         self.gaps.expect(self.resolve_topic_name("field_state"))
 
     def _is_listening_to_players(self) -> bool:
-        """Whether whoever says something every cycle is known and connected."""
+        """Whether every node that publishes each cycle is known and connected."""
         topics = self.gaps.topics
         return len(topics) > 1 and (
             self._reported >= 0 or all(self.count_publishers(topic) for topic in topics)

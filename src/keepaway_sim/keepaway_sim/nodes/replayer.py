@@ -1,4 +1,4 @@
-"""The replayer's node: says again what was recorded, byte for byte, at any rate.
+"""The replayer's node: publishes again what was recorded, byte for byte, at any rate.
 
 Names in the bag are taken relative to the node's namespace, so `-r __ns:=/again` moves a whole
 match; only /clock stays where it is.
@@ -36,7 +36,7 @@ from keepaway_sim.settings import setting
 from keepaway_sim.wire.messages import SECOND
 
 HISTORY = 2000
-"""Messages kept for slow listeners: a replay as fast as possible overtakes everybody."""
+"""Messages kept for slow listeners: a replay as fast as possible overtakes every subscriber."""
 LONGEST_SPIN = 0.1  # [s]
 LONGEST_LINGER = 5.0  # [s] for a listener that does not listen any more
 
@@ -137,10 +137,10 @@ class Replayer(Node):
         """Play to the end, which a loop has not.
 
         Args:
-            spin: lets ROS handle what has come, or waits for it so many seconds.
+            spin: lets ROS handle what has come, or waits that many seconds for it.
 
         Returns:
-            how many messages were said.
+            the number of messages published.
         """
         count = self._say(self.playback.prologue())
         self._await_subscribers(spin)
@@ -155,7 +155,7 @@ class Replayer(Node):
         return count
 
     def linger(self) -> None:
-        """Wait until listeners have what was said."""
+        """Wait until subscribers have what was published."""
         for publisher in self._publishers_by_topic.values():
             publisher.wait_for_all_acked(Duration(seconds=LONGEST_LINGER))
 
@@ -267,7 +267,7 @@ def main(args: list[str] | None = None) -> int:
         with stoppable(executor) as spin:
             count = replayer.play(spin)
             replayer.linger()
-        replayer.get_logger().info(f"said {count} messages")
+        replayer.get_logger().info(f"published {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
         get_logger("replayer").error(str(error))
         return 2

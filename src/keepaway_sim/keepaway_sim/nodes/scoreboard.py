@@ -57,7 +57,7 @@ class Scoreboard(Node):
         super().__init__("scoreboard", **node_options)
         self.match_id, self.num_ignored = match_id, 0
         self.episodes: dict[int, Episode] = {}
-        self.state = "no simulator was heard"
+        self.state = "no simulator was found"
         self.figures: dict[str, str] = {}
         self.troubles: dict[str, dict[str, int]] = {}
         self._num_wanted, self._out = num_wanted, out

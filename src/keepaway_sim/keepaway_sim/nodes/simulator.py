@@ -210,7 +210,7 @@ def _on_trigger(
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run a match until it is over or told to end (SIGINT, SIGTERM); then its bag is whole.
+    """Run a match until it has finished, or SIGINT or SIGTERM ends it; then its bag is whole.
 
     Raises:
         SystemExit: it cannot play.
@@ -231,5 +231,5 @@ def main(args: list[str] | None = None) -> None:
     except (KeepawayError, InvalidParameterTypeException) as error:
         raise SystemExit(f"simulator: {error}") from error
     finally:
-        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # all is said and saved
+        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
         rclpy.try_shutdown()

@@ -1,4 +1,4 @@
-"""The spectator's node: hears a match and shows it to browsers; see `live`."""
+"""The spectator's node: subscribes to a match and shows it to browsers; see `live`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,7 @@ class Spectator(Node):
     """Hears a match, from its description on, and feeds it to a live page."""
 
     def __init__(self, live: LiveMatch, **node_options: Any) -> None:
-        """Listen to the match; to its players once it has said who they are."""
+        """Listen to the match; to its players once it has named them."""
         super().__init__("spectator", **node_options)
         self._live = live
         self._heard: dict[str, tuple[str, Subscription]] = {}

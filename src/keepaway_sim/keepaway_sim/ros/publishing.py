@@ -76,7 +76,7 @@ class MatchPublisher:
         return bool(self._publishers[topic].get_subscription_count())
 
     def wait_until_received(self, topic: str, patience: float) -> None:
-        """Wait until all subscribers have what was published, at most so many seconds."""
+        """Wait until all subscribers have what was published, at most `patience` seconds."""
         self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
 
     def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
@@ -98,7 +98,7 @@ class MatchPublisher:
                 self._bag.write(*message)
         except KeepawayError as error:
             self._bag, self.trouble = None, str(error)
-            self._logger.error(f"the match goes on unrecorded: {error}")
+            self._logger.error(f"the match continues unrecorded: {error}")
 
 
 _PERCEPTION = (Perception, messages.PERCEPTION, QUEUE)

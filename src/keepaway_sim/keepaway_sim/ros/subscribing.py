@@ -60,7 +60,7 @@ def to_profile(qos: Qos, depth: int) -> QoSProfile:
 
 
 def offered_qos(node: Node, topic: str, otherwise: Qos) -> Qos:
-    """How a topic's publisher offers it; its depth is not told to anybody, so not known here."""
+    """How a topic's publisher offers it; its depth is not published, so not known here."""
     publishers = node.get_publishers_info_by_topic(topic)
     if not publishers:
         return otherwise

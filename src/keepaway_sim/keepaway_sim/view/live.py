@@ -2,7 +2,7 @@
 
 The server speaks to this machine only, unless told otherwise, and answers only requests that
 name it as their host and come from its own page. Events go over one long HTTP answer for each
-browser (server-sent events); a browser that is slow misses cycles, nobody waits for it.
+browser (server-sent events); a browser that is slow misses cycles; no other waits for it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Event = tuple[str, str]
 class LiveMatch:
     """Makes events of a match's messages, whatever order the topics come in.
 
-    Most of what is said is never shown, so messages are kept as they came and read when they are.
+    Most of what is published is never shown, so messages are kept as they came and read on demand.
 
     Attributes:
         history: the events that a browser needs to follow from now on.
@@ -53,7 +53,7 @@ class LiveMatch:
 
     @property
     def history(self) -> list[Event]:
-        """What was said before: the match, and its finished episodes."""
+        """What was published before: the match, and its finished episodes."""
         with self._lock:
             return [*([self._match] if self._match else []), *self._episodes]
 
@@ -78,9 +78,9 @@ class LiveMatch:
         return []
 
     def show(self) -> None:
-        """Send a moment, if it is time for one, of which all has been said, and episodes' ends.
+        """Send a moment, if it is time for one, of which everything has come, and episodes' ends.
 
-        All has been said of the moments before the newest.
+        Everything has come of the moments before the newest.
 
         Raises:
             KeepawayError: bytes that are not such a message, or not one of this match.
@@ -132,7 +132,7 @@ class LiveMatch:
             moment.asked[about.player_index] = data
 
     def _is_last(self, moment: _Moment) -> bool:
-        """Is it an episode's last moment, with all that is said in it?"""
+        """Is it an episode's last moment, with everything published in it?"""
         assert self._task is not None
         ended = moment.state and moment.outcome != Outcome.IN_PLAY
         return bool(ended) and len(moment.seen) >= self._task.num_players
@@ -147,7 +147,7 @@ class LiveMatch:
 
 @dataclass
 class _Moment:
-    """What was said in one cycle, as bytes."""
+    """What was published in one cycle, as bytes."""
 
     state: bytes = b""
     outcome: int = Outcome.IN_PLAY

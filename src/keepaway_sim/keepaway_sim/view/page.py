@@ -116,7 +116,7 @@ def match_data(match: Mapping[str, Any], facts: Sequence[str] = ()) -> dict[str,
 
 
 def episode_data(episode: EpisodeSummary) -> dict[str, Any]:
-    """What the page's list says of an episode."""
+    """What the page's list shows of an episode."""
     return {
         "number": episode.number,
         "duration": round(episode.duration, 3),
@@ -212,7 +212,7 @@ def _who_played(bag: MatchBag) -> list[str]:
 
 
 def _policies(agents: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Who played how, where the bag says so and all of a team are alike."""
+    """Who played how, where the bag contains it and a team plays alike."""
     teams: dict[str, set[str]] = {}
     for name, settings in agents.items():
         teams.setdefault(name.split("_")[0] + "s", set()).add(

@@ -29,7 +29,7 @@ def picture(
         row: which of its cycles.
         task: who plays, on what field.
         visible_angle: of the players' views [rad].
-        player: whose belief is drawn as hollow marks; -1: nobody's.
+        player: whose belief is drawn as hollow marks; -1: none.
     """
     figure = Figure(figsize=(6.4, 6.4 * task.field_width / task.field_length), dpi=150)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

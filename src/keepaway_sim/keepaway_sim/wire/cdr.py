@@ -1,6 +1,6 @@
 """Messages as bytes without ROS: the CDR encoding of ROS 2, compiled from the .msg texts.
 
-A recording says with each topic how its messages are laid out (`ros2msg`: the .msg text and those
+A recording contains with each topic the layout of its messages (`ros2msg`: the .msg text and those
 of all messages inside it), so a `Codec` made of that text reads recordings of any age. Messages
 of fixed lengths are also numpy structured types (`Codec.dtype`): thousands of them are read or
 written at once.

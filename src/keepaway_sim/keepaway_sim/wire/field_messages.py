@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class FieldMessages:
-    """What one field of a World says to players and viewers, as bytes of this very moment."""
+    """What one field of a World publishes to players and viewers, as bytes of this very moment."""
 
     def __init__(self, world: World, field: int = 0, match_id: int = 0) -> None:
         """Lay out the messages for the world's number of players.

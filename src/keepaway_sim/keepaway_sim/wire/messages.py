@@ -1,7 +1,7 @@
 """One field of a World as the bytes of keepaway_msgs, and requests read from such bytes. No ROS.
 
-The simulator node publishes these bytes and the in-process trainer records them: what a message
-says is worked out here and nowhere else. Positions are in metres, velocities in the messages in
+The simulator node publishes these bytes and the in-process trainer records them: a message's
+contents are worked out here and nowhere else. Positions are in metres, velocities in messages in
 m/s (in the world m/cycle), times simulated.
 """
 
@@ -70,7 +70,7 @@ class MessageHead(NamedTuple):
 
     episode: int
     cycle: int
-    player_index: int = -1  # who hears or asks; -1: a FieldState
+    player_index: int = -1  # who receives it or asks; -1: a FieldState
     time_ns: int = -1  # simulated, its stamp; -1: an ActionRequest, which has none
     outcome: int = 0  # of a FieldState or Perception
     decision_due: bool = False  # of a Perception

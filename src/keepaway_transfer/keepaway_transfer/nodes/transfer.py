@@ -1,6 +1,6 @@
 """The transfer node: applies rho to a weights file when it is asked to.
 
-Its service `transfer/apply` says in words why it refuses: a missing file, weights of a player or
+Its service `transfer/apply` reports in words why it refuses: a missing file, weights of a player or
 task that the mapping is not from, an unknown variant, a file that is there already.
 """
 

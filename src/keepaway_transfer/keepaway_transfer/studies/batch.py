@@ -8,7 +8,7 @@ The seed plan: a run's random numbers follow from the study's seed, from what th
 it plays and all that was learned before, `study.Row.origin`) and from the trial's number, and from
 nothing else. So rows that start alike give the same trials in any two studies of one seed and one
 world, whatever the rows are called; rows that start otherwise are independent of one another,
-unless the study says that they share their sources or their seeds.
+unless the study lets them share their sources or their seeds.
 """
 
 import zlib

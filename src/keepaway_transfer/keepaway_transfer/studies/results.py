@@ -169,15 +169,15 @@ def open_results(
     resume: bool = False,
     any_code: bool = False,
 ) -> Iterator[ResultsFolder]:
-    """Begin a results folder, or go on with one of the same settings and code.
+    """Begin a results folder, or resume one of the same settings and code.
 
     Args:
         folder: made if it does not exist.
         study: whose trials will be appended.
         command: that the folder is begun with, kept beside the results.
         code_version: of this run; every trial carries the version it was played with.
-        resume: go on if there are results.
-        any_code: go on also with code of another version.
+        resume: continue if there are results.
+        any_code: resume also with code of another version.
 
     Raises:
         StudyError: results are there and `resume` is not asked for; they were made with other
@@ -185,7 +185,7 @@ def open_results(
     """
     folder = Path(folder)
     if (folder / STUDY_FILE).exists() and not resume:
-        raise StudyError(f"{folder} has results: add --resume to go on, or name another folder")
+        raise StudyError(f"{folder} has results: add --resume to continue, or name another folder")
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / TRIALS_FILE, "a+", encoding="utf-8") as file:
         _lock(file, folder)  # before anything is written that another process may have written too
