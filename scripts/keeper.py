@@ -10,6 +10,7 @@ import argparse
 import sys
 
 from keepaway_agent.nodes.keeper import main
+from keepaway_agent.nodes.player import PlayerSettings
 from keepaway_agent.playing.agent import AgentConfig, WeightsFiles
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 
@@ -20,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument("--name", default="", help="of the player (default keeper_1)")
-    for group in (AgentConfig, WeightsFiles):
+    for group in (AgentConfig, WeightsFiles, PlayerSettings):
         add_options(made, group)
     return made
 

@@ -144,7 +144,11 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
 def player_settings(args: argparse.Namespace, name: str, role: TaskRole) -> dict[str, object]:
     """The parameters of a player's node."""
     policy = getattr(args, f"{role.name.lower()}_policy")
-    settings: dict[str, object] = {"policy": policy, "resume": args.resume}
+    settings: dict[str, object] = {
+        "policy": policy,
+        "resume": args.resume,
+        "match_id": args.match_id,
+    }
     if policy in ("learn", "greedy") and args.load_weights:
         given = args.load_weights.absolute()
         settings["load_weights"] = str(given / f"{name}.npz" if given.is_dir() else given)

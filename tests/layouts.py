@@ -4,6 +4,7 @@
 """
 
 import hashlib
+import itertools
 import json
 import random
 import re
@@ -110,12 +111,13 @@ def with_foreign_topics(messages: Many) -> Many:
 
 
 def old_definition(messages: Many) -> Many:
-    """A Perception's definition without its last field."""
+    """A Perception's definition without cycles_to_ball and what came to stand behind it."""
 
     def older(definition: bytes) -> bytes:
         head, *inside = definition.decode().split("=" * 80, 1)
         lines = [line for line in head.splitlines() if line.split("#")[0].strip()]
-        return "\n".join([*lines[:-1], *("=" * 80 + part for part in inside)]).encode()
+        known = itertools.takewhile(lambda line: " cycles_to_ball" not in line, lines)
+        return "\n".join([*known, *("=" * 80 + part for part in inside)]).encode()
 
     return [
         said._replace(definition=older(said.definition))

@@ -65,7 +65,7 @@ class Witness(Node):
         self.missing: Counter[str] = Counter()
         self.absent: set[str] | None = None
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, QUEUE)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QUEUE)
 
     def _on_episode(self, message: Episode) -> None:
         self.numbers.append(message.number)

@@ -9,6 +9,7 @@ TWINS = {
     "world/compiled.py": "compiled.py",
     "settings.py": "settings.py",
     "ros/parameters.py": "nodes/parameters.py",
+    "ros/running.py": "nodes/running.py",
 }
 
 

@@ -55,7 +55,7 @@ def test_greedy_players_use_what_they_know_and_do_not_change_it(graph: Graph, fi
 
 
 def test_services_save_and_load(graph: Graph, file: Path, tmp_path: Path) -> None:
-    keeper = graph.start_player("keeper_1", policy="learn")
+    keeper = graph.start_player("keeper_1", policy="learn", weights_dir=str(tmp_path))
     play_some(graph)
     new = tmp_path / "new.npz"
     saved = graph.call(SaveWeights, "keeper_1/save_weights", path=str(new))
@@ -68,7 +68,7 @@ def test_services_save_and_load(graph: Graph, file: Path, tmp_path: Path) -> Non
 
 
 def test_services_refuse_in_words(graph: Graph, file: Path, tmp_path: Path) -> None:
-    graph.start_player("keeper_1", policy="learn")
+    graph.start_player("keeper_1", policy="learn", weights_dir=str(tmp_path))
 
     def save(path: object) -> str:
         return str(graph.call(SaveWeights, "keeper_1/save_weights", path=str(path)).message)
@@ -84,7 +84,11 @@ def test_services_refuse_in_words(graph: Graph, file: Path, tmp_path: Path) -> N
     broken.write_bytes(file.read_bytes()[:500])
     assert "no path was given" in save("")
     assert "is there already" in save(file)
-    assert "cannot be written" in save("/proc/new.npz")
+    assert "cannot be written" in save(file / "new.npz")
+    (tmp_path / "way_out").symlink_to("/")
+    for outside in ("/proc/new.npz", "../new.npz", "way_out/tmp/new.npz"):
+        assert f"{outside} is not in {tmp_path}: set weights_dir" in save(outside)
+        assert f"{outside} is not in {tmp_path}: set weights_dir" in load(outside)
     assert "cannot be read" in load(tmp_path / "none.npz")
     assert "not a whole weights file" in load(broken)
     assert "in 4v3, not of a keeper in 3v2" in load(larger)

@@ -141,7 +141,7 @@ def test_strangers_cannot_move_a_player_or_stop_the_match(graph: Graph) -> None:
             stranger.publish(lies[simulator.conductor.num_cycles // 10 % len(lies)])
 
     health: list[DiagnosticArray] = []
-    graph.node.create_subscription(DiagnosticArray, "diagnostics", health.append, 10)
+    graph.node.create_subscription(DiagnosticArray, "/diagnostics", health.append, 10)
     graph.hook = lie
     assert graph.play() == played(trained(2, policy="random"))
     assert simulator.conductor.roster.seats[0].rejected > 0
@@ -204,13 +204,13 @@ def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:
     assert simulator.conductor.num_cycles == 0
     assert graph.call(Trigger, "start").message == "plays"
     graph.play(until=lambda: simulator.conductor.num_cycles >= 3)
-    assert graph.call(Trigger, "pause").success
+    assert graph.call(Trigger, "simulator/pause").success
     cycles = simulator.conductor.num_cycles
     until = time.monotonic() + 0.3
     graph.play(until=lambda: time.monotonic() > until)
     assert simulator.conductor.num_cycles <= cycles + 1
     assert graph.call(Trigger, "start").success
-    assert graph.call(Trigger, "reset").success
+    assert graph.call(Trigger, "simulator/reset").success
     graph.play(until=lambda: simulator.conductor.num_finished >= 1)
     assert graph.episodes[0].outcome == Episode.ABORTED
 
@@ -271,7 +271,7 @@ def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
         ("/clock", Clock, 10),
         ("field_state", FieldState, 10),
         ("markers", MarkerArray, 10),
-        ("diagnostics", DiagnosticArray, 10),
+        ("/diagnostics", DiagnosticArray, 10),
     ):
         graph.node.create_subscription(message, topic, seen.setdefault(topic, []).append, qos)
     graph.play(until=lambda: all(seen.values()) and len(seen["/clock"]) > 1)
@@ -280,7 +280,7 @@ def test_spectators_may_come_late_and_see_everything(graph: Graph) -> None:
     assert len(state.positions) == 12
     assert {seen["/clock"][k].clock.nanosec % 100_000_000 for k in (0, -1)} == {0}
     assert state.stamp != Time()
-    health = seen["diagnostics"][-1]
+    health = seen["/diagnostics"][-1]
     assert [status.name for status in health.status][:2] == ["/simulator", "/keeper_1"]
     assert health.status[1].message == "plays"
 

@@ -165,9 +165,18 @@ def test_bytes_that_are_no_message_are_refused(data: bytes) -> None:
         REQUEST.decode(data)
 
 
-def test_strings_of_unknown_lengths_have_no_fixed_place() -> None:
-    with pytest.raises(KeepawayError, match=r"AgentStatus\.name has no fixed place"):
-        codec("keepaway_msgs/msg/AgentStatus").dtype({})
+def test_a_string_is_where_its_length_says() -> None:
+    status = codec("keepaway_msgs/msg/AgentStatus")
+    said = {"name": "keeper_1", "policy": "hand", "episodes": 7, "match_id": 9}
+    values = status.decode(status.encode(said))
+    row = np.frombuffer(status.encode(said), status.dtype(status.lengths(values)))[0]
+    assert (row["name"], row["name.length"], row["policy"]) == (b"keeper_1", 9, b"hand")
+    assert (row["episodes"], row["match_id"]) == (7, 9)
+
+
+def test_sequences_of_strings_have_no_fixed_place() -> None:
+    with pytest.raises(KeepawayError, match=r"Match\.player_names has no fixed place"):
+        codec("keepaway_msgs/msg/Match").dtype({})
 
 
 def test_a_message_that_is_not_installed_is_named() -> None:

@@ -5,26 +5,26 @@ from the latched `match` what is played, reports on its `status` that it is read
 perception comes, and answers perceptions.
 """
 
-import faulthandler
 import gc
-import signal
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import rclpy
-from rclpy.exceptions import InvalidParameterTypeException
+import attrs
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
 from keepaway_agent.nodes.parameters import declare_settings
+from keepaway_agent.nodes.running import run_node
 from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, WeightsFiles, check_config
+from keepaway_agent.settings import setting
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 
@@ -38,8 +38,19 @@ ANNOUNCEMENT_PERIOD = (
     0.5  # [s] a first message may be lost although the nodes have found each other
 )
 PATIENCE = 0.25  # [s] at most, from being told to end to ending
-LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
+
+
+@attrs.frozen
+class PlayerSettings:
+    """A player's parameters as a process among others."""
+
+    match_id: int = setting(
+        0, "the number of the only match that it joins; 0: the first one", "", f"[0, {2**63 - 1}]"
+    )
+    weights_dir: str = setting(
+        ".", "folder in which its services may read and write weights, and nowhere else"
+    )
 
 
 class PlayerNode(Node):
@@ -66,6 +77,7 @@ class PlayerNode(Node):
         self._config = declare_settings(self, AgentConfig)
         check_config(role, self._config)
         files = declare_settings(self, WeightsFiles)
+        self._settings = declare_settings(self, PlayerSettings)
         self._save_every = files.save_every
         self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
         self._start_weights = self._weights_to_start_from(files)
@@ -110,8 +122,14 @@ class PlayerNode(Node):
 
     def _on_match(self, match: Match) -> None:
         """Join a new match, but no other one while the own one's simulator is there."""
+        wanted = self._settings.match_id
         is_another = self._match_id not in (0, match.match_id)
-        if is_another and self.count_publishers("match") > 1:
+        if wanted and match.match_id != wanted:
+            self.get_logger().warning(
+                f"another simulator publishes `match` here ({match.task}, number"
+                f" {match.match_id}): ignored, match_id is {wanted}"
+            )
+        elif is_another and self.count_publishers("match") > 1:
             self._other_match = match
             self._reconsidering.reset()
             self.get_logger().warning(
@@ -207,13 +225,27 @@ class PlayerNode(Node):
             except WeightsError as error:  # the disk may have room again next time
                 self.get_logger().error(f"after episode {perceived.episode}: {error}")
 
+    def _path_of(self, asked: str) -> Path:
+        """The file that a service may use: the own one, or one in `weights_dir`.
+
+        Raises:
+            AgentError: there is none, or it is elsewhere.
+        """
+        if not asked:
+            if self._weights_path is None:
+                raise AgentError("no path was given, and save_weights is not set")
+            return self._weights_path
+        folder = Path(self._settings.weights_dir).resolve()
+        path = (folder / asked).resolve()
+        if not path.is_relative_to(folder):
+            raise AgentError(f"{asked} is not in {folder}: set weights_dir to a folder above it")
+        return path
+
     def _on_save(
         self, request: SaveWeights.Request, response: SaveWeights.Response
     ) -> SaveWeights.Response:
-        path = Path(request.path) if request.path else self._weights_path
         try:
-            if path is None:
-                raise AgentError("no path was given, and save_weights is not set")
+            path = self._path_of(request.path)
             save_weights(path, self._learned(), overwrite=path == self._weights_path)
         except AgentError as error:
             response.message = str(error)
@@ -225,10 +257,8 @@ class PlayerNode(Node):
     def _on_load(
         self, request: LoadWeights.Request, response: LoadWeights.Response
     ) -> LoadWeights.Response:
-        path = Path(request.path) if request.path else self._weights_path
         try:
-            if path is None:
-                raise AgentError("no path was given, and save_weights is not set")
+            path = self._path_of(request.path)
             if self.agent is None:
                 raise AgentError("no match yet, so it is not known which weights would fit")
             self.agent.use(load_weights(path))
@@ -243,25 +273,20 @@ class PlayerNode(Node):
 def main(role: Role, args: list[str] | None = None) -> None:
     """Run one player until it is told to end (SIGINT, SIGTERM); then its weights are saved.
 
-    Signals only leave word: nothing is interrupted halfway.
-
     Raises:
         SystemExit: it cannot play.
     """
-    told: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda signum, _: told.append(signum))
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    settings = (AgentConfig, WeightsFiles, PlayerSettings)
+    run_node(role.name.lower(), partial(_play, role), settings, AgentError, args)
+
+
+def _play(role: Role, is_told_to_end: Callable[[], bool]) -> None:
+    player = PlayerNode(role)
+    executor = EventsExecutor()  # the quick one
+    executor.add_node(player)
+    gc.freeze()  # nor what has been compiled
     try:
-        player = PlayerNode(role)
-        executor = EventsExecutor()  # the quick one
-        executor.add_node(player)
-        gc.freeze()  # what has been imported and compiled stays: no collection looks at it again
-        while not told:
+        while not is_told_to_end():
             executor.spin_once(timeout_sec=PATIENCE)
+    finally:  # a match in which it cannot play is no reason to forget what it knows
         player.save()
-    except (AgentError, InvalidParameterTypeException) as error:
-        raise SystemExit(f"{role.name.lower()}: {error}") from error
-    finally:
-        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # all is saved
-        rclpy.try_shutdown()

@@ -37,9 +37,16 @@ def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, in
             other = int(found[found != length][0])
             raise KeepawayError(f"{layout.message_type}: {other} {name}, where {length} should be")
     sizes = rows[:, 3] - rows[:, 2]
-    if (sizes > taken.itemsize + PAYLOAD).any():
+    if (sizes > taken.itemsize + _text_sizes(taken, lengths) + PAYLOAD).any():
         raise KeepawayError(f"{layout.message_type} of {int(sizes.max())} bytes, longer than it is")
     return taken
+
+
+def _text_sizes(taken: np.ndarray, lengths: Mapping[str, int]) -> np.ndarray:
+    """(n,) bytes of the strings at messages' ends, which are left unread: a header's frame."""
+    names = [name for name in taken.dtype.names or () if name.endswith(".length")]
+    unread = [name for name in names if name.removesuffix(".length") not in lengths]
+    return sum((taken[name].astype(np.int64) for name in unread), np.zeros(len(taken), np.int64))
 
 
 def check_fields(layout: Codec, names: tuple[str, ...], lengths: Mapping[str, int]) -> None:

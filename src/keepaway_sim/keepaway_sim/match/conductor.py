@@ -302,8 +302,9 @@ class Conductor:
         outlet, make = self._outlet, self._messages
         outlet.publish_if_wanted("/clock", make.clock, stamp)
         outlet.publish_if_wanted("field_state", make.field_state, stamp)
-        if now >= self._markers_at and outlet.has_subscribers("markers"):
-            self._markers_at = now + MARKER_PERIOD
+        is_due = now >= self._markers_at - MARKER_PERIOD / 2  # cycles are not quite regular
+        if is_due and outlet.has_subscribers("markers"):
+            self._markers_at = max(self._markers_at, now - MARKER_PERIOD / 2) + MARKER_PERIOD
             outlet.publish("markers", make.markers(), stamp)
 
     def _collect(self) -> None:

@@ -175,7 +175,7 @@ class Roster:
             if not self._due[player]:
                 continue
             seat.missed += not seat.data
-            if seat.in_force is not None:
+            if seat.in_force is not None and (seat.present or seat.data):
                 action[0, player], target[0, player] = seat.in_force.action, seat.in_force.target
             else:
                 action[0, player] = self._default(player)

@@ -65,7 +65,7 @@ class Scoreboard(Node):
         self._bar: tqdm[Any] | None = None
         self.create_subscription(Match, "match", self._on_match, MATCHES)
         self.create_subscription(Episode, "episode", self._on_episode, ALL)
-        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, QUEUE)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QUEUE)
 
     @property
     def has_begun(self) -> bool:

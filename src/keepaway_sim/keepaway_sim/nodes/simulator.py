@@ -5,10 +5,8 @@ It is wiring: `match.conductor` plays the match, this connects it to topics, ser
 
 from __future__ import annotations
 
-import faulthandler
 import gc
 import json
-import signal
 import time
 from collections.abc import Callable
 from functools import partial
@@ -16,14 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match
@@ -32,10 +27,11 @@ from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
-from keepaway_sim.ros.diagnostics import diagnostics, player_statuses, simulator_status
+from keepaway_sim.ros.diagnostics import Troubles, diagnostics, simulator_status
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.publishing import ALL, LATCHED, MATCHES, QUEUE, MatchPublisher
 from keepaway_sim.ros.raw_subscription import PROCESS_SIZE, RawSubscription
+from keepaway_sim.ros.running import run_node
 from keepaway_sim.settings import same
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config, Physics, Skills, Vision, profile
@@ -45,7 +41,6 @@ DIAGNOSTICS_PERIOD = 1.0  # [s]
 LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 OWN_TOPICS = ("match", "episode", "field_state", "/clock")
 """No other node publishes these in a match."""
-LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 
 
 @attrs.frozen
@@ -82,6 +77,7 @@ class Simulator(Node):
         self.conductor.on_begin = self._publish_diagnostics
         self.conductor.on_end = self._publish_last_diagnostics
         self._diagnosed_at, self._diagnosed_cycles = time.monotonic(), 0
+        self._troubles = Troubles()
         self._subscribe()
         self._offer()
         self.conductor.announce()
@@ -148,8 +144,9 @@ class Simulator(Node):
         """Services and diagnostics."""
         conductor = self.conductor
         for action in (conductor.start, conductor.pause, conductor.reset):
-            self.create_service(Trigger, action.__name__, partial(_on_trigger, action))
-        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", QUEUE)
+            for name in (f"~/{action.__name__}", action.__name__):  # the second: until 0.3
+                self.create_service(Trigger, name, partial(_on_trigger, action))
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", QUEUE)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
 
     def _on_request(self, player: int, data: bytes, gid: bytes) -> None:
@@ -184,7 +181,7 @@ class Simulator(Node):
         self._diagnostics.publish(
             diagnostics(
                 simulator_status(prefix, conductor.state(), figures, strays),
-                player_statuses(prefix, seats, answering),
+                self._troubles.player_statuses(prefix, seats, answering, now),
                 conductor.match_id,
                 stamp,
             )
@@ -215,21 +212,15 @@ def main(args: list[str] | None = None) -> None:
     Raises:
         SystemExit: it cannot play.
     """
-    told: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda signum, _: told.append(signum))
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    run_node("simulator", _play, (MatchSettings, Config), KeepawayError, args)
+
+
+def _play(is_told_to_end: Callable[[], bool]) -> None:
+    simulator = Simulator()
+    executor = EventsExecutor()  # the quick one
+    executor.add_node(simulator)
+    gc.freeze()  # nor what has been compiled
     try:
-        simulator = Simulator()
-        executor = EventsExecutor()  # the quick one
-        executor.add_node(simulator)
-        gc.freeze()  # what has been imported and compiled stays: no collection looks at it again
-        try:
-            simulator.play(lambda timeout: executor.spin_once(timeout), lambda: bool(told))
-        finally:
-            simulator.close()
-    except (KeepawayError, InvalidParameterTypeException) as error:
-        raise SystemExit(f"simulator: {error}") from error
+        simulator.play(lambda timeout: executor.spin_once(timeout), is_told_to_end)
     finally:
-        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
-        rclpy.try_shutdown()
+        simulator.close()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from keepaway_sim.match.roster import Seat
+
+RECOVERY = 10.0  # [s] without anything new after which a player's trouble is over
 
 
 def diagnostics(
@@ -43,26 +46,57 @@ def simulator_status(
     )
 
 
-def player_statuses(
-    namespace: str, seats: Sequence[Seat], num_answering: Sequence[int]
-) -> list[DiagnosticStatus]:
-    """One for every player; `num_answering` nodes answer for each."""
-    return [_of_player(namespace, *each) for each in zip(seats, num_answering, strict=True)]
+class Troubles:
+    """Who had trouble lately: a player's status recovers once nothing new is counted."""
+
+    def __init__(self) -> None:
+        """Nobody yet."""
+        self._seen: dict[str, tuple[dict[str, int], float]] = {}  # counts, and since when
+
+    def player_statuses(
+        self, namespace: str, seats: Sequence[Seat], num_answering: Sequence[int], now: float
+    ) -> list[DiagnosticStatus]:
+        """One status for every player.
+
+        Args:
+            namespace: of the match.
+            seats: the players.
+            num_answering: how many nodes answer for each.
+            now: the monotonic clock [s].
+        """
+        return [
+            _of_player(namespace, seat, num, self._is_recent(seat, now))
+            for seat, num in zip(seats, num_answering, strict=True)
+        ]
+
+    def _is_recent(self, seat: Seat, now: float) -> bool:
+        """Whether something was counted within the last `RECOVERY`."""
+        counts = _counts(seat)
+        known, since = self._seen.get(seat.name, (dict.fromkeys(counts, 0), -math.inf))
+        if counts != known:
+            since = now
+        self._seen[seat.name] = counts, since
+        return now - since < RECOVERY
 
 
-def _of_player(namespace: str, seat: Seat, num_answering: int) -> DiagnosticStatus:
+def _counts(seat: Seat) -> dict[str, int]:
+    return {"late": seat.late, "missed": seat.missed, "rejected": seat.rejected}
+
+
+def _of_player(
+    namespace: str, seat: Seat, num_answering: int, has_trouble: bool
+) -> DiagnosticStatus:
     if not seat.present:
         level, message = DiagnosticStatus.ERROR, "missing"
     elif num_answering > 1:
         level, message = DiagnosticStatus.WARN, f"{num_answering} nodes answer for it"
-    elif seat.missed or seat.late or seat.rejected:
+    elif has_trouble:
         level, message = DiagnosticStatus.WARN, "plays, with trouble"
     else:
         level, message = DiagnosticStatus.OK, "plays"
-    counts = {"late": seat.late, "missed": seat.missed, "rejected": seat.rejected}
     return DiagnosticStatus(
         level=level,
         name=f"{namespace}{seat.name}",
         message=message,
-        values=[KeyValue(key=key, value=str(count)) for key, count in counts.items()],
+        values=[KeyValue(key=key, value=str(count)) for key, count in _counts(seat).items()],
     )

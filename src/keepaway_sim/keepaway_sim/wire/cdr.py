@@ -109,7 +109,7 @@ class Codec:
             size: bytes of a message, if they may be padded otherwise than `encode` does.
 
         Raises:
-            KeepawayError: the message has strings of unknown lengths, or sequences of messages.
+            KeepawayError: the message has sequences of strings or of messages.
         """
         try:
             return self._laid_out(self._leaves(self._root, "", lengths), size)
@@ -247,10 +247,11 @@ class Codec:
                     yield name, number, number.itemsize
                 elif size:
                     yield name, (number, (size,)), number.itemsize
-            elif field.type == "string" and not field.is_array and name in lengths:
+            elif field.type == "string" and not field.is_array:
                 yield f"{name}.length", "<u4", 4
-                yield name, f"S{lengths[name]}", 1
-            elif field.type == "string" or field.is_array:
+                if lengths.get(name):
+                    yield name, f"S{lengths[name]}", 1
+            elif field.is_array:
                 raise KeepawayError(f"{self.message_type}.{name} has no fixed place")
             else:
                 yield from self._leaves(self._messages[field.type], f"{name}.", lengths)

@@ -15,6 +15,8 @@ _ARROW, _SPHERE, _CYLINDER, _LINE_STRIP, _TEXT = 0, 2, 3, 4, 9
 _HEIGHT = 1.2  # [m] of a player
 _COLOURS = {Role.KEEPER: (0.0, 0.45, 0.70), Role.TAKER: (0.84, 0.37, 0.0)}
 _WHITE = (1.0, 1.0, 1.0)
+_YELLOW = (1.0, 0.9, 0.1)
+_NAME_BELOW = 1.1  # [m] a name stands beside its player, seen from above
 
 Marker = dict[str, Any]
 
@@ -42,16 +44,18 @@ def _border(task: Task) -> Marker:
 
 
 def _ball(x: float, y: float) -> Marker:
-    size = 4 * Physics().ball_size  # twice its true size, to be seen from above
-    return _marker("ball", 0, _SPHERE, (size, size, size), _WHITE, (x, y, size / 2))
+    """Twice its true size and above the players' heads, to be seen from above at any moment."""
+    size = 4 * Physics().ball_size
+    return _marker("ball", 0, _SPHERE, (size, size, size), _YELLOW, (x, y, _HEIGHT + size))
 
 
 def _player(index: int, name: str, role: Role, x: float, y: float, yaw: float) -> list[Marker]:
     wide, colour = 2 * Physics().player_size, _COLOURS[role]
+    beside = (x, y - _NAME_BELOW, 0.1)
     return [
         _marker("body", index, _CYLINDER, (wide, wide, _HEIGHT), colour, (x, y, _HEIGHT / 2)),
         _marker("direction", index, _ARROW, (1.0, 0.12, 0.12), colour, (x, y, _HEIGHT), yaw),
-        _marker("name", index, _TEXT, (0.0, 0.0, 0.7), _WHITE, (x, y, _HEIGHT + 0.7), text=name),
+        _marker("name", index, _TEXT, (0.0, 0.0, 0.7), _WHITE, beside, text=name),
     ]
 
 

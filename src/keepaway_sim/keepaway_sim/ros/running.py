@@ -1,0 +1,91 @@
+"""How a node's process begins and ends: its arguments, signals, errors in one line, exit code 1.
+
+The packages of the world and of the agents share no code, so each has this same file; a contract
+test holds the two together.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import signal
+import sys
+from collections.abc import Callable, Sequence
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from keepaway_sim.settings import settings_of
+
+LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
+
+Play = Callable[[Callable[[], bool]], None]
+"""What a node does, until what it is given says that it is told to end."""
+
+
+def run_node(
+    name: str,
+    play: Play,
+    settings: Sequence[type],
+    refusal: type[Exception],
+    args: list[str] | None = None,
+) -> None:
+    """Run a node until it is done or told to end (SIGINT, SIGTERM).
+
+    Signals only leave word: nothing is interrupted halfway.
+
+    Args:
+        name: of the node.
+        play: makes the node and plays it.
+        settings: the classes of its parameters, for `--help`.
+        refusal: raised by `play` where the node cannot run, with a message for a person.
+        args: the command line without the program's name; None: the process's.
+
+    Raises:
+        SystemExit: with one line and exit code 1 where it cannot run; or after `--help`.
+    """
+    check_arguments(name, settings, sys.argv[1:] if args is None else args)
+    told: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, _: told.append(signum))
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        gc.freeze()  # what has been imported stays: no collection looks at it again
+        play(lambda: bool(told))
+    except (refusal, ParameterException) as error:
+        raise SystemExit(f"{name}: {error}") from error
+    finally:
+        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
+        rclpy.try_shutdown()
+
+
+def check_arguments(name: str, settings: Sequence[type], args: Sequence[str]) -> None:
+    """Answer `--help`, and refuse what is not ROS's.
+
+    Raises:
+        SystemExit: after the help (0), or because of an argument that nothing would read (1).
+    """
+    own = remove_ros_args(["", *args])[1:]
+    if {"-h", "--help"} & set(own):
+        print(usage(name, settings))  # noqa: T201
+        raise SystemExit(0)
+    if own:
+        raise SystemExit(
+            f"{name}: {' '.join(own)}: not understood; parameters are given as"
+            f" --ros-args -p NAME:=VALUE, and --help lists them"
+        )
+
+
+def usage(name: str, settings: Sequence[type]) -> str:
+    """The help text of a node: every parameter with its default, unit and sentence."""
+    declared = [each for group in settings for each in settings_of(group).values()]
+    wide = max((len(each.name) for each in declared), default=0)
+    lines = [
+        f"  {each.name:{wide}}  {each.text}{f' [{each.unit}]' if each.unit else ''}"
+        f" (default {each.default!r})"
+        for each in declared
+    ]
+    head = f"usage: {name} [--ros-args [-r __node:=NAME] [-r __ns:=/NAMESPACE] [-p NAME:=VALUE]..]"
+    return "\n".join([head, "", "parameters:", *lines])
