@@ -29,7 +29,7 @@ from keepaway_transfer.reports import plotting
 from keepaway_transfer.reports.evidence import Evidence, read_evidence, scratch_difference
 from keepaway_transfer.reports.kwy import KeepawayLog, read_kwy
 from keepaway_transfer.reports.page import page as page_of
-from keepaway_transfer.reports.page import page_figures
+from keepaway_transfer.reports.page_figures import page_figures
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.studies.results import pack, read_results
 
@@ -70,8 +70,9 @@ def _analyse_study(folder: Path, arguments: argparse.Namespace) -> int:
         return _write_page(folder, arguments.page)
     results, out = read_results(folder), arguments.out or folder
     print(write_report(results, out, threshold=arguments.threshold, curves=arguments.curves))
-    pack(folder, out)
-    print(f"Written to {out}: table.md, figures and all they are made of, trials.parquet.")
+    if arguments.threshold is None:
+        pack(folder, out)
+    print(f"Written to {out}: table.md and figures.")
     return 0
 
 

@@ -7,11 +7,13 @@ import pytest
 
 from keepaway_transfer.reports.evidence import (
     Evidence,
+    beyond_optimism,
     difference,
     read_evidence,
     scratch_difference,
 )
-from keepaway_transfer.reports.page import beyond_optimism, page, page_figures
+from keepaway_transfer.reports.page import page
+from keepaway_transfer.reports.page_figures import page_figures
 from keepaway_transfer.studies.records import Record
 from keepaway_transfer.studies.results import Results
 from keepaway_transfer.studies.study import load_study
@@ -69,10 +71,33 @@ def test_the_page_says_what_optimism_explains(studies):
     assert "h: 86% of it, without a source." in text
 
 
+def test_table2_is_measured_at_a_lower_threshold_where_its_episodes_are_known(studies):
+    assert "### The same trials to 8.2 s" not in page(studies)
+    results = studies["table2"].results
+    known = [
+        dataclasses.replace(one, blocks=(50 * 85,) * 30, first=(85,), last=(85,))
+        for one in results.records
+    ]
+    studies["table2"] = Evidence(dataclasses.replace(results, records=tuple(known)))
+    text = page(studies).split("### The same trials to 8.2 s")[1]
+    assert "| 1000 | 12 of 12 | 2.36 [2.36, 2.36] |" in text  # 1,000 episodes of 8.5 s
+
+
 def test_a_way_that_never_hurts_is_told_from_one_that_does(studies):
     lines = {line.split("|")[1].strip(): line for line in page(studies).splitlines() if "|" in line}
     assert "| worse after 6000, 9000 | worse after 3000, 6000, 9000 |" in lines["`table2`"]
     assert "| yes | yes | after 1000: 4.00 [" in lines["`table2_at_5`"]
+
+
+def test_what_the_way_of_carrying_alone_saves_after_too_much_training_is_told(studies):
+    hours = {"rho": 45.0, "rescaled": 20.0}
+    studies["variants_6000"] = study_of(
+        "variants_6000", lambda row: hours.get(row.variant, 40.0) if row.stages else 30.0
+    )
+    text = page(studies)
+    assert "After 6,000 episodes 4v3 takes 45.00 [" in text
+    assert "h as `rescaled` does: 25.00 [25.00, 25.00] h are saved by the way of carrying" in text
+    assert "`variants_6000`, against optimistic at 5 s:" in text
 
 
 def test_studies_that_were_not_run_are_named_with_their_command(studies):

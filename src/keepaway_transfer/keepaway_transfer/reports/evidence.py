@@ -23,6 +23,7 @@ class Evidence:
     """The results of one study with all that was worked out of them."""
 
     results: Results
+    threshold: float | None = None  # [s] another than the study's
 
     @property
     def study(self) -> Study:
@@ -37,7 +38,7 @@ class Evidence:
     @cached_property
     def measures(self) -> list[TrialMeasures]:
         """Every trial's."""
-        return measure_trials(self.results)
+        return measure_trials(self.results, self.threshold)
 
     @cached_property
     def rows(self) -> dict[str, RowSummary]:
@@ -56,6 +57,10 @@ class Evidence:
         """The row other than scratch with the least hours, `target` or `total`."""
         others = [name for name in self.rows if name != self.scratch]
         return min(others, key=lambda name: float(getattr(self.rows[name], measure).estimate))
+
+
+Studies = Mapping[str, Evidence]
+"""Studies by the name of their folder."""
 
 
 def read_evidence(folder: Path | str) -> dict[str, Evidence]:
@@ -85,6 +90,25 @@ def difference(
         measure,
         _are_paired(one, name, other, other_name),
     )
+
+
+def beyond_optimism(studies: Studies) -> dict[str, tuple[Comparison, Comparison, Comparison]]:
+    """Every row of Table 2 with a source against the best optimistic start by target hours.
+
+    Returns:
+        by row: target hours saved, total hours saved, seconds held longer at first.
+    """
+    table2, optimistic = studies["table2"], studies["optimistic"]
+    best = optimistic, optimistic.best("target")
+    return {
+        name: (
+            difference(best, (table2, name), "target_hours"),
+            difference(best, (table2, name), "total_hours"),
+            difference((table2, name), best, "initial_performance"),
+        )
+        for name in table2.rows
+        if name != table2.scratch
+    }
 
 
 def scratch_difference(first: Evidence, second: Evidence) -> Comparison | None:
@@ -119,6 +143,3 @@ def _same_world(one: Evidence, other: Evidence) -> bool:
     return len(versions) == 1 and all(
         getattr(one.study, name) == getattr(other.study, name) for name in names
     )
-
-
-Studies = Mapping[str, Evidence]

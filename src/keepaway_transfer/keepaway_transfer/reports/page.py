@@ -4,16 +4,18 @@ Every number on it is worked out of the committed trials, or read from `elsewher
 what was measured on the real server. A study that was not run is named with the command to run it.
 """
 
-import json
-from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
-from keepaway_transfer.reports import plotting
-from keepaway_transfer.reports.evidence import Evidence, Studies, difference, scratch_difference
+from keepaway_transfer.reports.evidence import (
+    Evidence,
+    Studies,
+    beyond_optimism,
+    difference,
+    scratch_difference,
+)
 from keepaway_transfer.reports.page_parts import (
     Lines,
+    elsewhere,
     not_run,
     own_picture,
     picture,
@@ -21,11 +23,11 @@ from keepaway_transfer.reports.page_parts import (
     study_table,
 )
 from keepaway_transfer.reports.report import power, spread
-from keepaway_transfer.reports.statistics import Comparison, Interval, holm
+from keepaway_transfer.reports.statistics import holm
 from keepaway_transfer.reports.summary import verdict
 
-ELSEWHERE_FILE = Path(__file__).with_name("elsewhere.json")
 TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5")
+LOWER_THRESHOLD = 8.2  # [s] at which Table 2 is measured a second time
 NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
 
 
@@ -35,7 +37,7 @@ def page(studies: Studies) -> str:
     Args:
         studies: results by the name of their folder.
     """
-    elsewhere = json.loads(ELSEWHERE_FILE.read_text(encoding="utf-8"))
+    measured = elsewhere()
     sections = [
         ["# What transfer is worth", "", *_opening()],
         ["## What the paper claims", "", *PAPER],
@@ -43,43 +45,12 @@ def page(studies: Studies) -> str:
         ["## What optimism explains", "", *_optimism(studies)],
         ["## What transfer adds beyond it", "", *_beyond(studies)],
         ["## What too much training does, and why", "", *_overtraining(studies)],
-        ["## What the real server showed", "", *_real_server(elsewhere["real_server"])],
-        ["## What others measured", "", *_others(elsewhere["others"])],
+        ["## What the real server showed", "", *_real_server(measured["real_server"])],
+        ["## What others measured", "", *_others(measured["others"])],
         ["## A transfer that never hurts", "", *_never_hurts(studies)],
         ["## The data", "", *_data(studies)],
     ]
     return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
-
-
-def page_figures(studies: Studies) -> dict[str, Figure]:
-    """The figures of the page that are not a study's own, by name."""
-    elsewhere = json.loads(ELSEWHERE_FILE.read_text(encoding="utf-8"))
-    figures = {
-        "real_server": _real_server_figure(elsewhere["real_server"]),
-        "others": _others_figure(elsewhere["others"]),
-    }
-    if {"table2", "optimistic"} <= studies.keys():
-        figures["beyond_optimism"] = _beyond_figure(studies)
-    return figures
-
-
-def beyond_optimism(studies: Studies) -> dict[str, tuple[Comparison, Comparison, Comparison]]:
-    """Every row of Table 2 with a source against the best optimistic start by target hours.
-
-    Returns:
-        by row: target hours saved, total hours saved, seconds held longer at first.
-    """
-    table2, optimistic = studies["table2"], studies["optimistic"]
-    best = optimistic, optimistic.best("target")
-    return {
-        name: (
-            difference(best, (table2, name), "target_hours"),
-            difference(best, (table2, name), "total_hours"),
-            difference((table2, name), best, "initial_performance"),
-        )
-        for name in table2.rows
-        if name != table2.scratch
-    }
 
 
 PAPER = [
@@ -118,8 +89,8 @@ def _rows(studies: Studies) -> Lines:
         "",
         picture("Hours to 9.0 s by episodes of 3v2", "table2"),
     ]
+    lines += _at_lower_threshold(studies)
     for name, words, figure in (
-        ("table2_at_8.2", "The same trials at another threshold", "time_to_threshold"),
         ("figure3", "Figure 3: learning for a fixed time", "learning_curves"),
         ("fivevfour", "5v4", "time_to_threshold"),
     ):
@@ -131,6 +102,17 @@ def _rows(studies: Studies) -> Lines:
             lines += ["", f"### Other ways than rho (`{name}`)", "", *_variants(found)]
             lines += ["", picture("Hours to 9.0 s by the way of transfer", name)]
     return lines
+
+
+def _at_lower_threshold(studies: Studies) -> Lines:
+    """Table 2 again, where the trials are known well enough."""
+    lower, table2 = studies.get("table2_at_8.2"), studies["table2"]
+    if lower is None and all(record.has_episodes for record in table2.results.records):
+        lower = Evidence(table2.results, LOWER_THRESHOLD)
+    if lower is None:
+        return []
+    title = f"### The same trials to {LOWER_THRESHOLD:g} s"
+    return ["", title, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
 
 
 def _variants(variants: Evidence) -> Lines:
@@ -358,38 +340,3 @@ def _scratch_rows(studies: Studies) -> Lines:
 def _same_goal(one: Evidence, other: Evidence) -> bool:
     names = "target", "threshold", "window", "max_hours"
     return all(getattr(one.study, name) == getattr(other.study, name) for name in names)
-
-
-def _real_server_figure(real: dict[str, Any]) -> Figure:
-    limit = real["limit_hours"]
-    hours = [limit if arm["to_9"] is None else arm["to_9"] for arm in real["arms"]]
-    labels = [
-        arm["name"] + (f" (not in {limit:g} h)" if arm["to_9"] is None else "")
-        for arm in real["arms"]
-    ]
-    return plotting.intervals(
-        labels,
-        [Interval(one, one, one) for one in hours],
-        title="The real server, one run an arm",
-        x_label="Hours of 4v3 to 9.0 s",
-    )
-
-
-def _others_figure(others: dict[str, Any]) -> Figure:
-    return plotting.intervals(
-        [row["name"] for row in others["rows"]],
-        [Interval(row["hours"], row["hours"], row["hours"]) for row in others["rows"]],
-        title="Hua & Sheppard 2023, means of 10 trials",
-        x_label="Hours of 4v3 to 9.0 s",
-    )
-
-
-def _beyond_figure(studies: Studies) -> Figure:
-    found = beyond_optimism(studies)
-    return plotting.intervals(
-        list(found),
-        [Interval(*total[:3]) for _, total, _ in found.values()],
-        title=f"Table 2 against the best optimistic start ({studies['optimistic'].best('target')})",
-        x_label="Total hours saved",
-        zero=True,
-    )

@@ -1,9 +1,15 @@
 """Pieces of the page of results: a study's table, what its verdicts say in a sentence, pictures."""
 
+import json
+from pathlib import Path
+from typing import Any
+
 from keepaway_transfer.reports.evidence import Evidence
 from keepaway_transfer.reports.report import spread
 from keepaway_transfer.reports.statistics import Comparison
 from keepaway_transfer.reports.summary import Against, RowSummary, verdict
+
+ELSEWHERE_FILE = Path(__file__).with_name("elsewhere.json")
 
 Lines = list[str]
 
@@ -14,6 +20,12 @@ WORDS = {
     "open": "not decided for",
 }
 """What is said of rows by the first word of their verdicts."""
+
+
+def elsewhere() -> dict[str, Any]:
+    """What was measured on the real server, here and by others."""
+    data: dict[str, Any] = json.loads(ELSEWHERE_FILE.read_text(encoding="utf-8"))
+    return data
 
 
 def said_of(one: Evidence, measure: str, what: str) -> Lines:

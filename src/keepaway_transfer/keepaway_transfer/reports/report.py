@@ -246,6 +246,8 @@ def _label(row: Row) -> str:
 
 def _amount_of(study: Study) -> str:
     """What the rows have more and more of, in words; empty if they differ otherwise."""
+    if not any(row.stages for row in study.rows):
+        return "Value of every action at the start" if len(study.rows) > 2 else ""
     ways = {
         (row.variant, *(stage.task for stage in row.stages)) for row in study.rows if row.stages
     }
