@@ -30,6 +30,7 @@ from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.player import PlayerNode
 from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
+from keepaway_sim.cli.interrupts import SIGNALS
 from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
@@ -68,8 +69,9 @@ def main() -> int:
     """Play, say how it went."""
     args = parse()
     told: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda signum, _: told.append(signum))
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup stays nohup
+            signal.signal(number, lambda signum, _: told.append(signum))
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
@@ -90,7 +92,7 @@ def main() -> int:
         rclpy.try_shutdown()
     board.conclude()
     report(args, board.summary())
-    return 130 if told else 0
+    return 128 + told[0] if told else 0  # as shells expect it: 130 after Ctrl-C
 
 
 def seat_agents(args: argparse.Namespace, task: Task) -> None:
