@@ -192,7 +192,8 @@ def expect_success(command: Sequence[str], cwd: str | None = None, **env: str) -
 
 
 def expect_one_line(done: subprocess.CompletedProcess[str], words: str) -> None:
-    """AssertionError unless the command wrote one printable line of errors with these words."""
+    """AssertionError unless a command was refused in one printable line with these words."""
+    assert done.returncode == 1, done
     (line,) = done.stderr.splitlines() or [""]
     assert words in line, done.stderr
     assert line.isprintable(), ascii(line)
