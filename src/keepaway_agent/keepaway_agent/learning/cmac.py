@@ -238,6 +238,15 @@ def action_values(weights, cells, values):
 
 
 @compiled
+def action_value(weights, cells):
+    """The value of one action; (num_features, num_weights) weights, (num_features,) fine cells."""
+    value = 0.0
+    for i in range(len(cells)):
+        value += window_sum(weights[i, cells[i] : cells[i] + NUM_TILINGS])
+    return value
+
+
+@compiled
 def add_to_active(weights, cells, amount):
     """Add `amount` to the weight of every active tile.
 

@@ -8,12 +8,14 @@ discount_t are the reward and the discount since then, q_t the value of the acti
     step(r, discount, s)  choose a from the weights before the update;
                         delta = r + discount * q_t - q_tm1
                         weights += alpha / num_active * delta * traces
+                        the value of a is computed again
                         traces *= discount * lambda; the active tiles of the other actions
                         get the trace 0, those of a the trace 1
     end(r)              delta = r - q_tm1; weights += alpha / num_active * delta * traces
 
-q_tm1 is the value as it was when the action was chosen. A learner that made no decision in an
-episode learns nothing from its end.
+q_tm1 is the value of the last action by the weights right after it was chosen (P LinearSarsaAgent:
+the update that goes with the choice moves them). A learner that made no decision in an episode
+learns nothing from its end.
 
 With lambda = 0 only the tiles of the last decision have traces, so nothing is kept but that
 decision. With lambda > 0 the traces are a dense array with a list of the places that are not 0.
@@ -31,6 +33,7 @@ from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.cmac import (
     NUM_TILINGS,
     Tiling,
+    action_value,
     action_values,
     add_to_active,
     tile_cells,
@@ -215,7 +218,10 @@ def step(learners, i, r_t, discount_t, uniforms):
     update(learners, i, r_t + discount_t * learners.values[i, action] - learners.value[i])
     if learners.rates.lambda_ > 0.0:
         decay_traces(learners, i, discount_t * learners.rates.lambda_)
-    return remember(learners, i, action)
+    remember(learners, i, action)
+    weights = learners.weights[learners.table[i]]
+    learners.value[i] = action_value(weights[action], learners.cells[i])
+    return action
 
 
 @compiled
@@ -249,6 +255,13 @@ def decide(learners, i, reward, cycle, uniforms):
         action = step(learners, i, r_t, discount_t, uniforms)
     learners.cycle[i] = cycle
     return action
+
+
+@compiled
+def resume(learners, i, cycle):
+    """The last action goes on: what it is paid counts from `cycle`, not from its decision."""
+    if learners.action[i] != NO_ACTION:
+        learners.cycle[i] = cycle
 
 
 @compiled

@@ -204,6 +204,8 @@ class Agent:
             self._end_episode(perceived.view.cycle, perceived.outcome)
         elif perceived.decision_due:
             self._answer = self._decide(perceived.view)
+        else:
+            self._keep_passing(perceived.view.cycle)
         return self._answer
 
     def _decide(self, view: View) -> Decision:
@@ -233,6 +235,8 @@ class Agent:
         self._rule.compile_for(nothing, self._uniforms, self._order)
         self._finish = Kernel(policies.end_episode, self.learners, 0, self._player)
         self._finish.compile_for(0, int(Outcome.ABORTED))
+        self._keep_passing = Kernel(policies.keep_passing, self.learners, 0)
+        self._keep_passing.compile_for(0)
 
 
 def _as_compiled(view: View) -> View:

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from keepaway_agent.actions import NO_TARGET, Action, Outcome, Role
+from keepaway_agent.actions import NO_TARGET, UNREACHABLE, Action, Outcome, Role
 from keepaway_agent.compiled import compiled
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
@@ -75,7 +75,7 @@ class View(NamedTuple):
 
     position: np.ndarray  # (num_players + 1, 2) [m] players in match order, then the ball
     age: np.ndarray  # (num_players + 1,) [cycles] since each was last perceived
-    cycles_to_ball: np.ndarray  # (num_players,) of the fastest of the team, else UNREACHABLE
+    cycles_to_ball: np.ndarray  # (num_players,) of the fastest keeper, else UNREACHABLE
     ball_kickable: bool
     cycle: int  # since kick-off
 
@@ -139,6 +139,16 @@ def keeper_decision(learners, i, player, view, uniforms, order):
     if choice == 0:
         return Action.HOLD_BALL, NO_TARGET, True
     return Action.PASS_BALL, order[choice], True
+
+
+@compiled
+def keep_passing(learners, i, cycle):
+    """No decision is due, because a pass that still needs another kick goes on.
+
+    P KeepawayPlayer.cc: that counts as the last action again, so the pass is paid from its last
+    kick on.
+    """
+    sarsa.resume(learners, i, cycle)
 
 
 @compiled
@@ -251,13 +261,16 @@ def hand_coded_taker(player, view):
 
 @compiled
 def num_nearer_takers(player, view):
-    """How many other takers are believed nearer to the ball; unknown ones are not counted."""
+    """How many other takers are believed nearer to the ball.
+
+    Where one of them is unknown they stand in match order (UT Austin's sort then sorts nothing).
+    """
     ball = len(view.position) - 1
     own = distance(view.position, player.own, ball)
     nearer = 0
     for taker in range(player.num_keepers, ball):
-        if taker == player.own or view.age[taker] > MAX_KNOWN_AGE:
-            continue
+        if view.age[taker] > MAX_KNOWN_AGE:
+            return player.own - player.num_keepers
         other = distance(view.position, taker, ball)
         if other < own or (other == own and taker < player.own):
             nearer += 1
@@ -266,23 +279,37 @@ def num_nearer_takers(player, view):
 
 @compiled
 def most_open_keeper(player, view):
-    """The keeper with the fewest takers in the pass lane from the ball's holder; -1: none known.
+    """The keeper with the fewest takers in the pass lane to it; -1: none known.
 
+    The lanes begin at the keeper who is believed to reach the ball first: the holder, or the
+    receiver while the ball flies. The lane to that one itself has no length, so nobody is in it.
     The first of equal ones. The deciding taker counts too, as in UT Austin's framework.
     """
-    holder = nearest_to_ball(view.position, 0, player.num_keepers)
+    origin = passing_keeper(player, view)
     best, fewest = -1, len(view.position)
     for keeper in range(player.num_keepers):
-        if keeper == holder or view.age[keeper] > MAX_KNOWN_AGE:
+        if view.age[keeper] > MAX_KNOWN_AGE:
             continue
         blockers = 0
         for taker in range(player.num_keepers, len(view.position) - 1):
             known = view.age[taker] <= MAX_KNOWN_AGE
-            if known and in_lane(view.position, holder, keeper, taker):
+            if known and in_lane(view.position, origin, keeper, taker):
                 blockers += 1
         if blockers < fewest:
             best, fewest = keeper, blockers
     return best
+
+
+@compiled
+def passing_keeper(player, view):
+    """The keeper believed to reach the ball first; the one nearest to it where that is unknown."""
+    first = 0
+    for keeper in range(1, player.num_keepers):
+        if view.cycles_to_ball[keeper] < view.cycles_to_ball[first]:
+            first = keeper
+    if view.cycles_to_ball[first] == UNREACHABLE:
+        return nearest_to_ball(view.position, 0, player.num_keepers)
+    return first
 
 
 @compiled

@@ -13,6 +13,7 @@ from keepaway_agent.playing.policies import (
     Player,
     View,
     end_episode,
+    keep_passing,
     keeper_decision,
     taker_decision,
 )
@@ -51,8 +52,10 @@ def decide_all(d, asked):
             d.chose[f, p] = False
             if d.belief.outcome[f] != Outcome.IN_PLAY:
                 _end_episode(d, f, p)
-            if d.belief.decision_due[f, p]:
+            elif d.belief.decision_due[f, p]:
                 _answer(d, f, p)
+            elif p < d.keeper.num_keepers:
+                keep_passing(d.keepers, f * d.keeper.num_keepers + p, d.belief.cycle[f])
 
 
 @compiled

@@ -88,7 +88,7 @@ class Vision:
         0.01, "own felt speed is rounded to it; 0 is exact", "m/cycle", "[0, 10]"
     )
     self_position_error: float = setting(
-        0.15, "largest error of own position after a look", "m", "[0, 100]"
+        0.035, "largest error of own position after a look", "m", "[0, 100]"
     )
     self_yaw_error_deg: float = setting(
         0.3,

@@ -10,16 +10,9 @@ from keepaway_sim.world.compiled import compiled, compiled_apart
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import TWO_PI, length
 from keepaway_sim.world.hearing import hear, speak
-from keepaway_sim.world.memory import feel_self, forget, remember
+from keepaway_sim.world.memory import feel_self, forget, remember, roll_on
 from keepaway_sim.world.skills import tactics
-from keepaway_sim.world.skills.prediction import (
-    LATELY,
-    UNKNOWN_SPEED,
-    Body,
-    ball_of,
-    body_of,
-    cycles_to_ball,
-)
+from keepaway_sim.world.skills.fastest import fastest_keeper
 from keepaway_sim.world.skills.running import expected_turn
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.streams import draw
@@ -112,8 +105,10 @@ def _take_request(w, f, p, action, target):
         if action == _PASS and belief.ball_kickable[f, p]:
             memory.pass_cycle[f, p] = belief.cycle[f]
             memory.pass_rank[f, p] = tactics.rank_of(w, f, p, target)
-    elif c.pass_by_rank and truth.action[f, p] == _PASS:
-        truth.target[f, p] = tactics.keeper_of_rank(w, f, p, memory.pass_rank[f, p])
+    else:  # a pass goes on
+        memory.pass_cycle[f, p] = belief.cycle[f]
+        if c.pass_by_rank:
+            truth.target[f, p] = tactics.keeper_of_rank(w, f, p, memory.pass_rank[f, p])
 
 
 @compiled
@@ -126,7 +121,7 @@ def _carry_out(w, f, p):
     memory.turned[f, p] = expected_turn(w, f, p, command)
     memory.kicked[f, p] = False
     if c.hearing:
-        speak(w, f, p, kind == KICK)
+        speak(w, f, p, command)
     yaw = truth.yaw[f, p]
     if kind == DASH:
         ax, ay = physics.dash_acceleration(c, power, yaw)
@@ -253,50 +248,46 @@ def _perceive(w, f):
         if w.belief.cycle[f] > 0:
             remember(w, f, p)
         feel_self(w, f, p)
+        looks = sight.looks_now(w, f, p)
+        if w.belief.cycle[f] > 0 and not (looks and sight.sees_all(w)):
+            roll_on(w, f, p)
+        if looks:
+            sight.look(w, f, p)
         if w.constants.hearing:
             hear(w, f, p)
-        if sight.looks_now(w, f, p):
-            sight.look(w, f, p)
         _judge(w, f, p)
 
 
 @compiled
 def _judge(w, f, p):
     """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
-    c, belief, memory = w.constants, w.belief, w.memory
+    c, belief = w.constants, w.belief
     ball = belief.position[f, p, w.ball]
     known = belief.age[f, p, w.ball] <= c.ball_lost_age
     own = belief.position[f, p, p]
     near = length(ball[0] - own[0], ball[1] - own[1]) < c.kickable_distance
     belief.ball_kickable[f, p] = known and near
     belief.cycles_to_ball[f, p, :] = NEVER
-    if belief.ball_kickable[f, p]:
+    if p < c.num_keepers and belief.ball_kickable[f, p]:
         belief.cycles_to_ball[f, p, p] = 0
-    elif known and p < c.num_keepers:
-        _find_fastest_keeper(w, f, p)
-    passing = memory.pass_cycle[f, p] == belief.cycle[f] - 1 and belief.ball_kickable[f, p]
-    belief.decision_due[f, p] = belief.outcome[f] == _IN_PLAY and not passing
+    elif known and (p < c.num_keepers or c.num_takers > 2):  # of two takers none marks
+        keeper, cycles = fastest_keeper(w, f, p)
+        if keeper >= 0:
+            belief.cycles_to_ball[f, p, keeper] = cycles
+    belief.decision_due[f, p] = belief.outcome[f] == _IN_PLAY and not _goes_on_passing(w, f, p)
 
 
 @compiled
-def _find_fastest_keeper(w, f, p):
-    """Which keeper reaches the ball first, as player p believes, and when (equal ones all count).
+def _goes_on_passing(w, f, p):
+    """Does a pass that player p asked for, or went on with, a cycle ago need another kick?
 
-    Begins with the keeper nearest to the ball, so that most others are soon seen to be slower.
+    P keeperWithBall: until the ball has left reach nobody is asked again. A keeper that has lost
+    sight of somebody forgets the pass.
     """
-    c, belief, memory = w.constants, w.belief, w.memory
-    nearest = tactics.nearest_to_ball(w, f, p, 0, c.num_keepers)
-    ball = ball_of(w, f, p)
-    fastest = 2 * c.intercept_horizon - 1
-    for k in range(c.num_keepers):
-        j = (nearest + k) % c.num_keepers
-        if j != p and belief.age[f, p, j] > c.player_lost_age:
-            continue
-        body = body_of(w, f, p, j)
-        if j != p and belief.cycle[f] - memory.motion_cycle[f, p, j] > LATELY:
-            body = Body(body.x, body.y, UNKNOWN_SPEED, 0.0, 0.0, 0.0)
-        cycles = cycles_to_ball(c, body, ball, fastest)
-        if cycles < fastest:
-            fastest = cycles
-            belief.cycles_to_ball[f, p, :] = NEVER
-        belief.cycles_to_ball[f, p, j] = cycles
+    c, belief = w.constants, w.belief
+    if w.memory.pass_cycle[f, p] != belief.cycle[f] - 1 or not belief.ball_kickable[f, p]:
+        return False
+    oldest = 0
+    for j in range(w.num_players):
+        oldest = max(oldest, belief.age[f, p, j])
+    return oldest <= c.player_lost_age

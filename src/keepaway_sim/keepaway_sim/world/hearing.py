@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
-from keepaway_sim.world.geometry import length, quantize
+from keepaway_sim.world.geometry import length
 from keepaway_sim.world.memory import same_team
-from keepaway_sim.world.physics import kick_acceleration, limited
+from keepaway_sim.world.physics import dash_acceleration
+from keepaway_sim.world.skills.kicking import ball_after
+from keepaway_sim.world.state import DASH, KICK
 from keepaway_sim.world.streams import draw
 
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
@@ -28,108 +30,154 @@ def hear(w, f, p):
     if speaker >= p:
         speaker += 1
     if speech.own_said[f, speaker]:
-        _hear_of_player(w, f, p, speaker, speech.own[f, speaker, 0], speech.own[f, speaker, 1])
+        x, y = speech.own[f, speaker]
+        _hear_of_player(w, f, p, speaker, x, y, 1)
     told = speech.opponent[f, speaker]
     if told >= 0:
         x, y = speech.opponent_position[f, speaker]
-        _hear_of_player(w, f, p, told, x, y)
+        _hear_of_player(w, f, p, told, x, y, 2)
     if speech.ball_age[f, speaker] >= 0:
         _hear_of_ball(w, f, p, speaker)
 
 
 @compiled
-def _hear_of_player(w, f, p, who, x, y):
-    belief = w.belief
-    if belief.age[f, p, who] > 1:
+def _hear_of_player(w, f, p, who, x, y, age):
+    """P processPerfectHearInfo: counts as seen `age` cycles ago, where nothing newer is known."""
+    belief, memory = w.belief, w.memory
+    if belief.age[f, p, who] > age or memory.nameless[f, p, who]:
         belief.position[f, p, who, 0], belief.position[f, p, who, 1] = x, y
         belief.velocity[f, p, who, 0] = 0.0
         belief.velocity[f, p, who, 1] = 0.0
-        belief.age[f, p, who] = 1
+        belief.age[f, p, who] = age
+        memory.nameless[f, p, who] = False
 
 
 @compiled
 def _hear_of_ball(w, f, p, speaker):
-    belief, speech = w.belief, w.speech
-    ball = w.ball
-    x, y, vx, vy = speech.ball[f, speaker]
-    own = belief.position[f, p, p]
-    known = belief.age[f, p, ball] < NEVER
-    if (
-        known
-        and length(belief.position[f, p, ball, 0] - own[0], belief.position[f, p, ball, 1] - own[1])
-        < DEAF_RANGE
-    ):
-        return
-    differs = (
-        length(vx - belief.velocity[f, p, ball, 0], vy - belief.velocity[f, p, ball, 1])
-        > CHANGED_VELOCITY
-    )
-    if belief.age[f, p, ball] > STALE_BALL or differs:
-        belief.position[f, p, ball, 0], belief.position[f, p, ball, 1] = x, y
-        belief.velocity[f, p, ball, 0], belief.velocity[f, p, ball, 1] = vx, vy
-        belief.age[f, p, ball] = speech.ball_age[f, speaker]
+    """P WMBallInfo: helps who is not near the ball and has not seen it move for a while.
+
+    Or who has just not seen it, and had another idea of how it moves.
+    """
+    belief, ball = w.belief, w.ball
+    place, motion = belief.position[f, p, ball], belief.velocity[f, p, ball]
+    said = w.speech.ball_age[f, speaker]
+    x, y, vx, vy = w.speech.ball[f, speaker]
+    if said > 0:
+        x, y = x + vx, y + vy
+        vx, vy = w.constants.ball_decay * vx, w.constants.ball_decay * vy
+    differs = length(vx - motion[0], vy - motion[1]) > CHANGED_VELOCITY
+    if belief.age[f, p, ball] < NEVER:
+        own = belief.position[f, p, p]
+        unseen = belief.cycle[f] - w.memory.motion_cycle[f, p, ball]
+        is_news = unseen > STALE_BALL or (unseen > said and differs)
+        if not is_news or length(place[0] - own[0], place[1] - own[1]) <= DEAF_RANGE:
+            return
+    if belief.age[f, p, ball] > said + 1 or differs:
+        place[0], place[1] = x, y
+        motion[0], motion[1] = vx, vy
+        belief.age[f, p, ball] = said + 1
 
 
 @compiled
-def speak(w, f, p, kicked):
-    """Compose what player p tells its team-mates after it chose its command.
+def speak(w, f, p, command):
+    """Compose what player p tells its team-mates after it chose its Command.
 
     A message holds ten characters (S): six for the ball, four for an opponent, three for the
-    own position, so the own position is left out where both others are told.
+    own position, so the own position is left out where both others are told (P: makeSayMessage).
     """
-    c, belief, speech = w.constants, w.belief, w.speech
-    num = w.num_players
-    own, ball = belief.position[f, p, p], belief.position[f, p, num]
-    distance = length(ball[0] - own[0], ball[1] - own[1])
-    speech.ball_age[f, p] = -1
-    if belief.age[f, p, num] == 0 and distance < SHARED_RANGE:
-        _speak_of_ball(w, f, p, distance, kicked)
+    belief, speech = w.belief, w.speech
+    next_x, next_y = _own_place_after(w, f, p, command)
+    _speak_of_ball(w, f, p, command, next_x, next_y)
+    nearest = _opponent_in_touch(w, f, p)
+    speech.opponent[f, p] = nearest
+    if nearest >= 0:
+        x, y = belief.position[f, p, nearest]
+        x, y = spelled(w.constants, p, x, y)
+        speech.opponent_position[f, p, 0], speech.opponent_position[f, p, 1] = x, y
+    speech.own_said[f, p] = not (nearest >= 0 and speech.ball_age[f, p] >= 0)
+    speech.own[f, p, 0], speech.own[f, p, 1] = spelled(w.constants, p, next_x, next_y)
+
+
+@compiled
+def _own_place_after(w, f, p, command):
+    """Where player p expects to be a cycle later."""
+    belief = w.belief
+    x, y = belief.position[f, p, p]
+    vx, vy = belief.velocity[f, p, p]
+    ax, ay = 0.0, 0.0
+    if command.kind == DASH:
+        ax, ay = dash_acceleration(w.constants, command.power, belief.body[f, p, p])
+    return x + vx + ax, y + vy + ay
+
+
+@compiled
+def _opponent_in_touch(w, f, p):
+    """The nearest opponent that player p sees within touch; -1: none."""
+    c, belief = w.constants, w.belief
+    own = belief.position[f, p, p]
     nearest, best = -1, c.feel_distance
-    for j in range(num):
+    for j in range(w.num_players):
         if same_team(c, p, j) or belief.age[f, p, j] != 0:
             continue
         away = length(belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1])
         if away < best:
             nearest, best = j, away
-    speech.opponent[f, p] = nearest
-    if nearest >= 0:
-        x, y = belief.position[f, p, nearest]
-        speech.opponent_position[f, p, 0] = quantize(x, c.hear_step_x)
-        speech.opponent_position[f, p, 1] = quantize(y, c.hear_step_y)
-    speech.own_said[f, p] = not (nearest >= 0 and speech.ball_age[f, p] >= 0)
-    speech.own[f, p, 0] = quantize(own[0] + belief.velocity[f, p, p, 0], c.hear_step_x)
-    speech.own[f, p, 1] = quantize(own[1] + belief.velocity[f, p, p, 1], c.hear_step_y)
+    return nearest
 
 
 @compiled
-def _speak_of_ball(w, f, p, distance, kicked):
-    c, belief, memory, speech = w.constants, w.belief, w.memory, w.speech
-    ball = w.ball
-    x, y = belief.position[f, p, ball]
-    vx, vy = belief.velocity[f, p, ball]
+def _speak_of_ball(w, f, p, command, next_x, next_y):
+    """Tell of a ball that is seen, or that is about to leave player p's reach.
+
+    Where the player kicks it away, it tells where that ball will be; a ball that stays in reach
+    is told to lie still.
+    """
+    c, belief, speech, ball = w.constants, w.belief, w.speech, w.ball
+    own, place = belief.position[f, p, p], belief.position[f, p, ball]
+    distance = length(place[0] - own[0], place[1] - own[1])
+    in_reach = distance < c.kickable_distance
+    x, y, vx, vy = ball_after_command(w, f, p, command)
+    away = length(x - next_x, y - next_y)
+    seen = belief.age[f, p, ball] == 0 and distance < SHARED_RANGE
+    speech.ball_age[f, p] = -1
+    if not seen and not (in_reach and away > c.kickable_distance):
+        return
     speech.ball_age[f, p] = 1
-    if distance < c.kickable_distance:
-        away = False
-        if kicked:
-            ax, ay = kick_acceleration(
-                c,
-                memory.command[f, p, 1],
-                memory.command[f, p, 2],
-                x - belief.position[f, p, p, 0],
-                y - belief.position[f, p, p, 1],
-                belief.body[f, p, p],
-            )
-            wx, wy = limited(vx + ax, vy + ay, c.ball_speed_max)
-            nx = belief.position[f, p, p, 0] + belief.velocity[f, p, p, 0]
-            ny = belief.position[f, p, p, 1] + belief.velocity[f, p, p, 1]
-            away = length(x + wx - nx, y + wy - ny) > c.kickable_distance + 0.2
-        if away:
-            x, y = x + wx, y + wy
-            vx, vy = wx * c.ball_decay, wy * c.ball_decay
-            speech.ball_age[f, p] = 0
-        else:
-            vx, vy = 0.0, 0.0
-    speech.ball[f, p, 0] = quantize(x, c.hear_step_x)
-    speech.ball[f, p, 1] = quantize(y, c.hear_step_y)
-    speech.ball[f, p, 2] = quantize(vx, c.hear_step_velocity)
-    speech.ball[f, p, 3] = quantize(vy, c.hear_step_velocity)
+    if in_reach and command.kind == KICK and away > c.kickable_distance + 0.2:
+        speech.ball_age[f, p] = 0
+    elif in_reach:
+        x, y, vx, vy = place[0], place[1], 0.0, 0.0
+    else:
+        x, y = place
+        vx, vy = belief.velocity[f, p, ball]
+    speech.ball[f, p, 0], speech.ball[f, p, 1] = spelled(c, p, x, y)
+    speech.ball[f, p, 2] = cut(vx, c.hear_step_velocity, p < c.num_keepers)
+    speech.ball[f, p, 3] = cut(vy, c.hear_step_velocity, p >= c.num_keepers)
+
+
+@compiled
+def ball_after_command(w, f, p, command):
+    """Place and velocity that player p expects of the ball a cycle later."""
+    x, y = ball_after(w, f, p, command)
+    decay, place = w.constants.ball_decay, w.belief.position[f, p, w.ball]
+    return x, y, decay * (x - place[0]), decay * (y - place[1])
+
+
+@compiled
+def spelled(c, p, x, y):
+    """A position as a message can spell it, in the axes of player p's team: y to the right."""
+    keeps = p < c.num_keepers
+    return cut(x, c.hear_step_x, keeps), cut(y, c.hear_step_y, not keeps)
+
+
+@compiled
+def cut(value, step, ahead):
+    """A number as one of 73 characters spells it: cut to the lower end of its step.
+
+    P SayMsgDataTypes.h: the steps lie evenly around 0, so what is told is half a step too low in
+    the mean, in the team's axes (`ahead`: they point like the field's).
+    """
+    if step == 0.0:
+        return value
+    sign = 1.0 if ahead else -1.0
+    return sign * (round(sign * value / step) - 0.5) * step

@@ -8,10 +8,14 @@ from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length, quantize, wrap
 from keepaway_sim.world.physics import dash_acceleration, kick_acceleration, limited
+from keepaway_sim.world.skills.fastest import fastest_to_ball
+from keepaway_sim.world.skills.prediction import ball_of
 from keepaway_sim.world.state import DASH
 from keepaway_sim.world.streams import draw
 
-CHASE_SPEED = 0.3  # [m/cycle] P: an unseen opponent nearest to the ball is believed to come so fast
+CHASE_SPEED = 0.3  # [m/cycle] P: the opponent fastest to the ball is believed to come so fast
+DRIFT = 0.25  # [m/cycle] P: so fast the others drift along x while they are not seen
+FLYING_BALL = 1.0  # [m/cycle] P: and twice as fast while the ball flies faster along x
 BUMPED_DISTANCE = 0.2  # [m] P: where a ball is believed after a bump
 
 
@@ -30,7 +34,9 @@ def forget(w, f, p):
         belief.age[f, p, j] = NEVER
         belief.velocity[f, p, j, 0] = 0.0
         belief.velocity[f, p, j, 1] = 0.0
+    memory.seen_cycle[f, p, :] = -NEVER
     memory.motion_cycle[f, p, :] = -NEVER
+    memory.nameless[f, p, :] = False
     memory.turned[f, p] = 0.0
     memory.kicked[f, p] = False
     memory.pass_cycle[f, p] = -2
@@ -42,11 +48,13 @@ def forget(w, f, p):
 
 @compiled
 def remember(w, f, p):
-    """Carry player p's belief about all others one cycle on, before anything new is known."""
+    """Carry player p's belief about itself and the ball one cycle on (P: after sense_body).
+
+    A ball is believed to lie still once it is within reach of the opponent that was nearest to it.
+    """
     c, belief, memory = w.constants, w.belief, w.memory
-    num = w.num_players
     position, velocity = belief.position[f, p], belief.velocity[f, p]
-    ball, kicked = num, memory.kicked[f, p]
+    ball, kicked = w.ball, memory.kicked[f, p]
     if kicked:
         ax, ay = kick_acceleration(
             c,
@@ -59,50 +67,80 @@ def remember(w, f, p):
         vx, vy = limited(velocity[ball, 0] + ax, velocity[ball, 1] + ay, c.ball_speed_max)
         velocity[ball, 0], velocity[ball, 1] = vx, vy
     belief.body[f, p, p] = wrap(belief.body[f, p, p] + memory.turned[f, p])
-    for j in range(num + 1):
+    for j in range(w.ball + 1):
         if belief.age[f, p, j] < NEVER:
             belief.age[f, p, j] += 1
-    chaser = _nearest_opponent_to_ball(w, f, p)
-    for j in range(num):
-        if j == p:
-            continue
-        if j == chaser:
-            dx = position[ball, 0] - position[j, 0]
-            dy = position[ball, 1] - position[j, 1]
-            distance = length(dx, dy)
-            if distance > 0.0:
-                position[j, 0] += CHASE_SPEED * dx / distance
-                position[j, 1] += CHASE_SPEED * dy / distance
-        else:
-            position[j, 0] += velocity[j, 0]
-            position[j, 1] += velocity[j, 1]
-        velocity[j, 0] *= c.player_decay
-        velocity[j, 1] *= c.player_decay
+    opponent = nearest_opponent_to_ball(w, f, p)
     position[ball, 0] += velocity[ball, 0]
     position[ball, 1] += velocity[ball, 1]
     velocity[ball, 0] *= c.ball_decay
     velocity[ball, 1] *= c.ball_decay
     if not kicked:
-        stop_ball_of_opponent(w, f, p)
+        _stop_ball(w, f, p, opponent)
+
+
+@compiled
+def roll_on(w, f, p):
+    """Carry player p's belief about the other players one cycle on.
+
+    P updateDynamicObjectForNextCycle: team-mates roll out, but for the first, who is never moved.
+    The opponent who is fastest to the ball comes to it. Of the plans of the others nothing is
+    known, and they drift along x: ahead while the ball flies ahead, else back.
+    """
+    c, belief = w.constants, w.belief
+    keeps = p < c.num_keepers
+    first, last = (c.num_keepers, w.num_players) if keeps else (0, c.num_keepers)
+    ball = ball_of(w, f, p)
+    chaser, _, _ = fastest_to_ball(w, f, p, first, last, ball, 2 * c.intercept_horizon - 1)
+    ahead = 1.0 if keeps else -1.0  # each team's own +x
+    drift = DRIFT * (2.0 if abs(ball.vx) > FLYING_BALL else 1.0)
+    drift = drift * ahead if ahead * ball.vx > 0.0 else -drift * ahead
+    position, velocity = belief.position[f, p], belief.velocity[f, p]
+    unmoved = 0 if keeps else c.num_keepers
+    for j in range(w.num_players):
+        if j in (p, unmoved) or belief.age[f, p, j] > c.player_lost_age:
+            continue
+        vx, vy = velocity[j, 0], velocity[j, 1]
+        if j == chaser:
+            vx, vy = toward(position[j, 0], position[j, 1], ball.x, ball.y, CHASE_SPEED)
+        elif first <= j < last:
+            vx, vy = drift, 0.0
+        position[j, 0] += vx
+        position[j, 1] += vy
+        velocity[j, 0] *= c.player_decay
+        velocity[j, 1] *= c.player_decay
+
+
+@compiled
+def toward(x, y, to_x, to_y, size):
+    """The vector of this size from a point toward another; no vector from a point to itself."""
+    dx, dy = to_x - x, to_y - y
+    distance = length(dx, dy)
+    share = size / distance if distance > 0.0 else 0.0
+    return share * dx, share * dy
 
 
 @compiled
 def stop_ball_of_opponent(w, f, p):
     """P: a ball within an opponent's reach is believed to lie still; nobody knows his plans."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    opponent = _nearest_opponent_to_ball(w, f, p)
-    if opponent < 0:
-        return
-    dx = belief.position[f, p, ball, 0] - belief.position[f, p, opponent, 0]
-    dy = belief.position[f, p, ball, 1] - belief.position[f, p, opponent, 1]
-    if length(dx, dy) < c.kickable_distance:
-        belief.velocity[f, p, ball, 0] = 0.0
-        belief.velocity[f, p, ball, 1] = 0.0
+    _stop_ball(w, f, p, nearest_opponent_to_ball(w, f, p))
 
 
 @compiled
-def _nearest_opponent_to_ball(w, f, p):
+def _stop_ball(w, f, p, opponent):
+    """Believe that the ball lies still if it is within this opponent's reach; -1: nobody's."""
+    position, velocity, ball = w.belief.position[f, p], w.belief.velocity[f, p], w.ball
+    if opponent < 0:
+        return
+    dx = position[ball, 0] - position[opponent, 0]
+    dy = position[ball, 1] - position[opponent, 1]
+    if length(dx, dy) < w.constants.kickable_distance:
+        velocity[ball, 0], velocity[ball, 1] = 0.0, 0.0
+
+
+@compiled
+def nearest_opponent_to_ball(w, f, p):
+    """The known opponent believed nearest to the ball; -1: none is known."""
     c, belief = w.constants, w.belief
     num = w.num_players
     nearest, best = -1, math.inf

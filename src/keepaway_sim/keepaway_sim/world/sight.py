@@ -1,14 +1,14 @@
 """What one player perceives and remembers: the belief its skills and its agent act on.
 
-A cycle has three steps for every player: `remember` carries the last belief one cycle on (dead
-reckoning, own kick and turn included), `hear` takes what a team-mate said, `look` replaces by
-what is seen, in two of every three cycles (150 ms between looks, 100 ms cycles).
+A cycle has four steps for every player: `remember` and `roll_on` carry the last belief one cycle on
+(own kick and turn included), `look` replaces by what is seen, in two of every three cycles (150 ms
+between looks, 100 ms cycles), `hear` takes what a team-mate said.
 
 Source: S visualsenderplayer.cpp for what is seen, P WorldModelUpdate.cc for what is made of it.
 Simplified against P, and why: own position is the truth plus an error that stays between looks
-(P: a particle filter over flags, whose remaining error is about as large); an unseen opponent
-that is not nearest to the ball rolls out (P moves it a quarter metre along x); players beyond
-the distance at which numbers are readable are not confused with each other.
+(P: a particle filter over flags; the error is as large as was measured on the real server); players
+beyond the distance at which numbers are readable are not confused with each other; there is no room
+for opponents who are none (P may count a felt team-mate as a third taker).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import math
 from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
-from keepaway_sim.world.config import NEVER, SIGHT_CELLS
+from keepaway_sim.world.config import SIGHT_CELLS
 from keepaway_sim.world.geometry import TWO_PI, bearing, length, quantize, rotated, wrap
+from keepaway_sim.world.ghosts import feel_somebody, forget_double, remove_ghosts
 from keepaway_sim.world.memory import stop_ball_of_opponent
 from keepaway_sim.world.streams import draw
 
-GHOST_MARGIN = math.radians(10.0)  # inside the cone's edge: there it must be seen
 DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is rounded to it
 
 
@@ -48,12 +48,13 @@ class Glimpse(NamedTuple):
 @compiled
 def look(w, f, p):
     """Player p sees its surroundings and updates its belief."""
-    c, belief, memory = w.constants, w.belief, w.memory
+    c, belief = w.constants, w.belief
     position, yaw = w.truth.position[f], w.truth.yaw[f]
     yaw_error = _look_at_self(w, f, p)
     face = yaw[p] + belief.neck[f, p]
     error = math.cos(yaw_error), math.sin(yaw_error)
     believed_face = math.cos(face + yaw_error), math.sin(face + yaw_error)
+    w.scratch.felt[:] = math.nan
     for j in range(w.ball + 1):
         if j == p:
             continue
@@ -62,23 +63,53 @@ def look(w, f, p):
         dx, dy = dx / distance, dy / distance
         direction = wrap(bearing(dx, dy) - face)
         seen = abs(direction) <= 0.5 * c.visible_angle
-        if not seen and (distance > c.feel_distance or _is_nameless(w, f, p, j)):
-            _forget_ghost(w, f, p, j)
+        if not seen and distance > c.feel_distance:
             continue
         if c.direction_step == 0.0:
             ux, uy = rotated(dx, dy, *error)
         else:
             step = round(direction / c.direction_step) + len(c.direction_cosine) // 2
             ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
+        if not seen and j < w.ball:
+            away = _reported_distance(c, distance)
+            w.scratch.felt[j, 0] = belief.position[f, p, p, 0] + away * ux
+            w.scratch.felt[j, 1] = belief.position[f, p, p, 1] + away * uy
+            continue
         moves = seen and _velocity_visible(w, f, distance)
         _see(w, f, p, j, Glimpse(dx, dy, distance, ux, uy, seen, moves))
-        if seen and j < w.ball:
-            belief.body[f, p, j] = wrap(yaw[j] + yaw_error)
-            if moves:
-                memory.motion_cycle[f, p, j] = belief.cycle[f]
+        if j < w.ball:
+            _recognize(w, f, p, j, wrap(yaw[j] + yaw_error), moves)
     own, ball = belief.position[f, p, p], belief.position[f, p, w.ball]
-    if length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance:
+    out_of_reach = length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance
+    if belief.age[f, p, w.ball] == 0 and out_of_reach:
         stop_ball_of_opponent(w, f, p)
+    if not sees_all(w):
+        for j in range(w.num_players):
+            if not math.isnan(w.scratch.felt[j, 0]):
+                feel_somebody(w, f, p, w.scratch.felt[j, 0], w.scratch.felt[j, 1])
+        remove_ghosts(w, f, p)
+
+
+@compiled
+def sees_all(w):
+    """Do players see all round?"""
+    return w.constants.visible_angle >= TWO_PI - 1e-9
+
+
+@compiled
+def _recognize(w, f, p, j, yaw, moves):
+    """Player j is seen by name, facing `yaw`: what that leaves in player p's memory."""
+    belief, memory = w.belief, w.memory
+    belief.body[f, p, j] = yaw
+    memory.seen[f, p, j, 0] = belief.position[f, p, j, 0]
+    memory.seen[f, p, j, 1] = belief.position[f, p, j, 1]
+    memory.seen_cycle[f, p, j] = belief.cycle[f]
+    if moves:
+        memory.seen[f, p, j, 2] = belief.velocity[f, p, j, 0]
+        memory.seen[f, p, j, 3] = belief.velocity[f, p, j, 1]
+    memory.nameless[f, p, j] = False
+    if not sees_all(w):
+        forget_double(w, f, p, j)
 
 
 @compiled
@@ -95,24 +126,6 @@ def _look_at_self(w, f, p):
         yaw_error = (2.0 * draw(w.random, f) - 1.0) * c.self_yaw_error
     belief.body[f, p, p] = wrap(truth.yaw[f, p] + yaw_error)
     return yaw_error
-
-
-@compiled
-def _is_nameless(w, f, p, j):
-    """S: who is only felt is no more than a player; P: it is taken for the one expected there."""
-    c, belief = w.constants, w.belief
-    return j < w.num_players and belief.age[f, p, j] > c.player_lost_age
-
-
-@compiled
-def _forget_ghost(w, f, p, j):
-    """P removeGhosts: what is not where it must be seen is not known any more."""
-    c, belief = w.constants, w.belief
-    own = belief.position[f, p, p]
-    dx, dy = belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1]
-    direction = wrap(bearing(dx, dy) - belief.body[f, p, p] - belief.neck[f, p])
-    if abs(direction) < 0.5 * c.visible_angle - GHOST_MARGIN:
-        belief.age[f, p, j] = NEVER
 
 
 @compiled
@@ -147,6 +160,7 @@ def _see_motion(w, f, p, j, glimpse, reported):
     if j == w.ball:
         vx, vy = _blended(c, vx, vy, belief.velocity[f, p, j, 0], belief.velocity[f, p, j, 1])
     belief.velocity[f, p, j, 0], belief.velocity[f, p, j, 1] = vx, vy
+    w.memory.motion_cycle[f, p, j] = belief.cycle[f]
 
 
 @compiled

@@ -52,7 +52,7 @@ class Belief(NamedTuple):
     age: np.ndarray  # (F, P, P + 1) int32 [cycles] since seen, felt or heard of; NEVER
     body: np.ndarray  # (F, P, P) [rad] body directions; own on the diagonal
     neck: np.ndarray  # (F, P) [rad] own neck relative to own body
-    cycles_to_ball: np.ndarray  # (F, P, P) int32 [cycles] of the fastest of the team; else NEVER
+    cycles_to_ball: np.ndarray  # (F, P, P) int32 [cycles] of the fastest keeper; else NEVER
     ball_kickable: np.ndarray  # (F, P) bool
     decision_due: np.ndarray  # (F, P) bool
     outcome: np.ndarray  # (F,) int8
@@ -65,12 +65,15 @@ class Memory(NamedTuple):
 
     self_error: np.ndarray  # (F, P, 2) [m] believed minus true own position
     look_phase: np.ndarray  # (F, P) int64
-    motion_cycle: np.ndarray  # (F, P, P) int64 cycle in which another's motion was seen last
+    seen: np.ndarray  # (F, P, P, 4) another as seen last: x, y [m], vx, vy [m/cycle]
+    seen_cycle: np.ndarray  # (F, P, P) int64 cycle in which another was seen or felt last
+    motion_cycle: np.ndarray  # (F, P, P + 1) int64 cycle in which its motion was seen last
+    nameless: np.ndarray  # (F, P, P) bool: another was felt last, and may be somebody else
     command: np.ndarray  # (F, P, 3) kind, power, angle of the last command
     turned: np.ndarray  # (F, P) [rad] own turn expected of the last command
     kicked: np.ndarray  # (F, P) bool: the last command kicked the ball
-    pass_cycle: np.ndarray  # (F, P) int64 cycle of the last fresh pass decision
-    pass_rank: np.ndarray  # (F, P) int64 receiver's rank by distance then, 0 the closest
+    pass_cycle: np.ndarray  # (F, P) int64 last cycle in which a pass was asked for or went on
+    pass_rank: np.ndarray  # (F, P) int64 its receiver's rank by distance, 0 the closest
     intercept_cycle: np.ndarray  # (F, P) int64 cycle in which the ball is to be met
     intercept_point: np.ndarray  # (F, P, 2) [m] and where
     vain_dashes: np.ndarray  # (F, P) int64 cycles in a row of dashing backward at rest
@@ -112,6 +115,7 @@ class Scratch(NamedTuple):
     num_pushes: np.ndarray  # (P + 1,)
     collided: np.ndarray  # (P + 1,) bool
     congestion: np.ndarray  # (25,) [1/m] of the points where a keeper may get open
+    felt: np.ndarray  # (P, 2) [m] where a player who is only felt seems to be; NaN: not felt
 
 
 class Fields(NamedTuple):
@@ -149,6 +153,7 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
             num_pushes=np.zeros(objects),
             collided=np.zeros(objects, dtype=np.bool_),
             congestion=np.zeros(len(constants.open_x)),
+            felt=np.zeros((num_players, 2)),
         ),
     )
 
@@ -191,7 +196,10 @@ def _make_memory(num_fields: int, num_players: int) -> Memory:
     return Memory(
         self_error=np.zeros((*shape, 2)),
         look_phase=np.zeros(shape, dtype=np.int64),
-        motion_cycle=np.full((*shape, num_players), -NEVER, dtype=np.int64),
+        seen=np.zeros((*shape, num_players, 4)),
+        seen_cycle=np.full((*shape, num_players), -NEVER, dtype=np.int64),
+        motion_cycle=np.full((*shape, num_players + 1), -NEVER, dtype=np.int64),
+        nameless=np.zeros((*shape, num_players), dtype=np.bool_),
         command=np.zeros((*shape, 3)),
         turned=np.zeros(shape),
         kicked=np.zeros(shape, dtype=np.bool_),

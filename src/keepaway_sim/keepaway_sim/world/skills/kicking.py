@@ -8,12 +8,13 @@ from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import clip, length, wrap
 from keepaway_sim.world.memory import same_team
 from keepaway_sim.world.physics import kick_acceleration, kick_rate, limited
-from keepaway_sim.world.skills.running import direction_of_play, turn_body_along
+from keepaway_sim.world.skills.running import turn_body_to
 from keepaway_sim.world.state import KICK, NONE, Command
 
 QUARTER = 0.25 * math.pi
 HOLD_RANGE = 5.0  # [m] a nearer opponent is shielded from
 AT_SPOT = 0.3  # [m] the ball lies well for holding
+GOAL_X = 52.5  # [m] P: who holds the ball turns toward the opponents' goal on a whole pitch
 STAYS_SHARE = 0.85  # [1] of the kickable distance, in which the ball must stay
 FREEZE_SHARE = 0.8
 OVER_POWER = 1.05  # [1] of full power that a pass may lack
@@ -72,7 +73,7 @@ def hold_ball(w, f, p, distance):
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
     spot = length(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))
     if spot < AT_SPOT:
-        chosen = turn_body_along(w, f, p, direction_of_play(c, p))
+        chosen = turn_body_to(w, f, p, GOAL_X if p < c.num_keepers else -GOAL_X, 0.0, 1)
         next_x, next_y = ball_after(w, f, p, Command(NONE, 0.0, 0.0))
         vx, vy = belief.velocity[f, p, p]
         stays = length(next_x - px - vx, next_y - py - vy)

@@ -16,10 +16,8 @@ from keepaway_sim.world.geometry import clip, length
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
 SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
-STILL = 0.01  # [m/cycle] a slower ball lies still
 BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
-LATELY = 3  # [cycles] P: motion seen longer ago is unknown
 UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
@@ -214,7 +212,7 @@ def meeting_cycles(c, body, ball, old_x, old_y, has_old):
     first = Meeting(NEVER, 0.0, 0.0)
     kept, kept_off = Meeting(NEVER, 0.0, 0.0), SAME_POINT
     speed = length(ball.vx, ball.vy)
-    i = _straight_run(c, body, ball, c.intercept_horizon)
+    i = _straight_run(c, body, 0, ball, c.intercept_horizon)
     while i <= c.intercept_horizon:
         bx, by = ball_ahead(c, ball, i)
         off = length(bx - old_x, by - old_y) if has_old else math.inf
@@ -296,29 +294,36 @@ def cycles_to_point(c, body, to_x, to_y):
 
 
 @compiled
-def cycles_to_ball(c, body, ball, limit):
-    """Cycles a player needs to reach the moving ball; NEVER if that takes more than `limit`.
+def reach_ball(c, body, lead, ball, limit):
+    """When a player reaches the moving ball.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
-    (P: getFastestInSetTo). Cycles are skipped in which it cannot be.
+    (P: createInterceptFeatures). Cycles are skipped in which it cannot be.
+
+    Args:
+        c: Constants.
+        body: Body of the player.
+        lead: cycles that it has been on its way already.
+        ball: Ball.
+        limit: the last cycle that is looked at.
+
+    Returns:
+        i, and the cycles that the player needs to there; NEVER, NEVER where i is beyond `limit`.
     """
     speed = length(ball.vx, ball.vy)
-    if speed < STILL:
-        needed = cycles_to_point(c, body, ball.x, ball.y)
-        return needed if needed <= limit else NEVER
-    i = _straight_run(c, body, ball, limit)
+    i = _straight_run(c, body, lead, ball, limit)
     while i <= limit:
         bx, by = ball_ahead(c, ball, i)
-        needed = cycles_to_point(c, body, bx, by)
+        needed = max(cycles_to_point(c, body, bx, by) - lead, 0)
         if needed <= i:
-            return needed
+            return i, needed
         left = _left_of_speed(c, c.ball_roll[i])
         i += max(int((needed - i) / (1.0 + speed * left)), 1)
-    return NEVER
+    return NEVER, NEVER
 
 
 @compiled
-def _straight_run(c, body, ball, limit):
+def _straight_run(c, body, lead, ball, limit):
     """Cycles before which nobody reaches the ball, even running straight without a turn.
 
     Beyond `limit` it is not looked for.
@@ -326,13 +331,13 @@ def _straight_run(c, body, ball, limit):
     The distance to a ball on a straight line is a convex function of the way it has rolled, so
     it falls by no more than it falls now; cycles in which it cannot have fallen enough are skipped.
     """
-    lead = c.kickable_distance + length(body.vx, body.vy) * c.player_roll[ROLL_CYCLES - 1]
+    near = c.kickable_distance + length(body.vx, body.vy) * c.player_roll[ROLL_CYCLES - 1]
     i = 0
     while i <= limit:
         bx, by = ball_ahead(c, ball, i)
         rel_x, rel_y = bx - body.x, by - body.y
         distance = length(rel_x, rel_y)
-        gap = distance - lead - c.top_speed * i
+        gap = distance - near - c.top_speed * (i + lead)
         if gap <= 0.0:
             return i
         coming = max(-(rel_x * ball.vx + rel_y * ball.vy) / distance, 0.0)

@@ -154,7 +154,7 @@ def pass_origin(w, f, p):
     c, belief = w.constants, w.belief
     ball = w.ball
     soonest = NEVER
-    for j in range(w.num_players):
+    for j in range(c.num_keepers):
         soonest = min(soonest, belief.cycles_to_ball[f, p, j])
     roll = c.ball_roll[soonest] if soonest < NEVER else 0.0
     x, y = belief.position[f, p, ball]
