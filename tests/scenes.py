@@ -15,7 +15,7 @@ from keepaway_sim.world.bodies import Bodies
 from keepaway_sim.world.config import NEVER, Config, noiseless, profile
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.skills import kicking, tactics
-from keepaway_sim.world.skills.prediction import ball_of, body_of, cycles_to_ball
+from keepaway_sim.world.skills.prediction import ball_of, body_of, reach_ball
 from keepaway_sim.world.state import Command, Fields, make_fields
 from keepaway_sim.world.streams import Draws
 
@@ -95,12 +95,19 @@ class Scene:
             self.velocity,
             self.yaw,
         )
+        self.memory.seen[0, :, :, :2] = self.position[:-1]
+        self.memory.seen[0, :, :, 2:] = self.velocity[:-1]
+        self.memory.seen_cycle[:] = self.memory.motion_cycle[:] = self.belief.cycle[0]
         away = np.linalg.norm(self.position[:-1] - self.position[-1], axis=1)
         self.belief.ball_kickable[0] = away < self.c.kickable_distance
 
     def lose(self, name: str, age: int = NEVER) -> None:
         """Let everybody have seen an object `age` cycles ago for the last time."""
-        self.belief.age[0, :, self.index(name)] = age
+        j = self.index(name)
+        self.belief.age[0, :, j] = age
+        self.memory.motion_cycle[0, :, j] = self.belief.cycle[0] - age
+        if j < self.ball:
+            self.memory.seen_cycle[0, :, j] = self.belief.cycle[0] - age
 
     def predict_meetings(self, name: str) -> None:
         """Let a player work out how soon each known team-mate reaches the ball."""
@@ -109,7 +116,7 @@ class Scene:
             if self.belief.age[0, p, j] < NEVER:
                 limit = 2 * self.c.intercept_horizon - 1
                 body, ball = body_of(self.w, 0, p, j), ball_of(self.w, 0, p)
-                self.belief.cycles_to_ball[0, p, j] = cycles_to_ball(self.c, body, ball, limit)
+                self.belief.cycles_to_ball[0, p, j] = reach_ball(self.c, body, 0, ball, limit)[1]
 
     def command(self, name: str, action: int, target: str = "1") -> tuple[float, float, float]:
         """A player's command: kind, power, angle [deg]."""

@@ -57,9 +57,9 @@ def test_two_episodes_with_lambda_0_by_hand():
     assert step(me, 1.0, 1.5, GREEDY_FIRST) == 1  # delta = 1 + 1.5 - 2 = 0.5
     assert values(me, 1.0) == [1, 2.25]
     assert values(me, 1.5) == [0.75, 1.6875]
-    sarsa.end(me, 0, 1.0)  # delta = 1 - 1.5, the value at the time of choosing
-    assert values(me, 1.5) == [0.75, 1.4375]
-    assert values(me, 1.0) == [1, 2.0625]
+    sarsa.end(me, 0, 1.0)  # delta = 1 - 1.6875, the value right after the update
+    assert values(me, 1.5) == [0.75, 1.34375]
+    assert values(me, 1.0) == [1, 2.25 - 0.75 * 0.34375]
 
 
 def test_an_episode_with_lambda_one_half_by_hand():
@@ -71,9 +71,10 @@ def test_an_episode_with_lambda_one_half_by_hand():
     assert (traces[1, 16:24] == 0.5).all()  # decayed
     assert (traces[1, 24:56] == 1.0).all()  # replaced, not added up
     assert traces.sum() == 8 * 0.5 + 32
-    sarsa.end(me, 0, 2.0)  # delta = 2: 1/32 to each tile of trace 1, 1/64 to those of 1/2
-    assert values(me, 1.5) == [0, 24 / 16 + 32 / 32]
-    assert values(me, 1.0) == [0, 32 / 16 + 8 / 64 + 24 / 32]
+    # The update made Q(1.5) 24/16, so delta = 1/2: 1/128 to each tile of trace 1, half to others.
+    sarsa.end(me, 0, 2.0)
+    assert values(me, 1.5) == [0, 24 / 16 + 32 / 128]
+    assert values(me, 1.0) == [0, 32 / 16 + 8 / 256 + 24 / 128]
     assert not me.traces.any()
 
 
@@ -128,6 +129,20 @@ def test_a_decision_is_paid_for_the_cycles_since_the_last_one():
     assert values(me, 1.0) == [0, 3.5]  # 7 cycles, alpha = 1/2
     sarsa.finish(me, 0, 1.0, 20)
     assert values(me, 5.0) == [0, 1.5]  # 3 cycles
+
+
+def test_an_action_that_goes_on_is_paid_from_then_on():
+    # P KeepawayPlayer.cc: going on with a pass counts as the last action again
+    me = learner()
+    sarsa.resume(me, 0, 9)
+    assert me.cycle[0] == 0  # nothing that could go on
+    me.state[0, 0] = 1.0
+    sarsa.decide(me, 0, 1.0, 10, GREEDY_LAST)
+    for cycle in (11, 12):
+        sarsa.resume(me, 0, cycle)
+    me.state[0, 0] = 5.0
+    sarsa.decide(me, 0, 1.0, 17, GREEDY_LAST)
+    assert values(me, 1.0) == [0, 2.5]  # 5 cycles, alpha = 1/2
 
 
 def test_time_discounts_by_the_cycle():

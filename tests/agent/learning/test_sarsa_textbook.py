@@ -58,7 +58,7 @@ class ReferenceSarsa:
         if self.config.lambda_ > 0:
             limit = self.config.min_trace
             self.traces = {tile: trace for tile, trace in self.traces.items() if trace >= limit}
-        return self._remember(state, action, q_t)
+        return self._remember(state, action, self.value(state, action))
 
     def end(self, r_t: float) -> None:
         if self.action is not None:

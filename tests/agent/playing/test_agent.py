@@ -110,6 +110,16 @@ def test_an_end_teaches_and_is_counted_with_its_time():
     assert (agent.episodes, agent.hours) == (1, pytest.approx(0.001))
 
 
+def test_a_cycle_in_which_nothing_is_due_goes_on_with_the_last_action():
+    agent, plain = learner(), learner()
+    agent.perceive(perceived(cycle=0))
+    assert agent.perceive(perceived(cycle=2)._replace(decision_due=False)) is None
+    agent.perceive(perceived(cycle=9, outcome=Outcome.TAKEN_AWAY))
+    plain.perceive(perceived(cycle=0))
+    plain.perceive(perceived(cycle=7, outcome=Outcome.TAKEN_AWAY))
+    assert same_weights(agent, plain)  # paid for the seven cycles after it went on
+
+
 def test_a_learners_values_come_with_its_choice_and_others_have_none():
     assert decision(learner()).values.tolist() == [0.0, 0.0, 0.0]
     assert len(decision(learner(), kickable=False).values) == 0

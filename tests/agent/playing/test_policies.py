@@ -196,27 +196,41 @@ def test_the_two_takers_nearest_to_the_ball_chase_it(four_v_three):
         assert answer == (Action.GO_TO_BALL, NO_TARGET, False)
 
 
+def marked_by(view, taker):
+    """Whom a taker of four_v_three marks; -1: it goes to the ball."""
+    action, target, _ = ask_taker(view, "hand", taker, takers(4, 3), num_keepers=4)
+    return target if action == Action.MARK_KEEPER else -1
+
+
 def test_the_third_taker_marks_the_keeper_with_the_fewest_takers_in_its_lane(four_v_three):
-    learners = takers(4, 3)
+    # UT Austin's BasicPlayer.cc markMostOpenOpponent: nobody is in the lane to the holder himself
+    assert marked_by(four_v_three, 6) == 0
+    four_v_three.age[0] = 13  # the holder is out of sight; lanes still begin where he was
     lanes = [
         [policies.in_lane(four_v_three.position, 0, keeper, taker) for taker in (4, 5, 6)]
         for keeper in (1, 2, 3)
     ]
-    assert not np.any(lanes)  # nobody stands in a lane: the first keeper but the holder
-    answer = ask_taker(four_v_three, "hand", 6, learners, num_keepers=4)
-    assert answer == (Action.MARK_KEEPER, 1, False)
+    assert not np.any(lanes)
+    assert marked_by(four_v_three, 6) == 1
     four_v_three.position[4] = (0.2, 1)  # T0 into the lane to K1
-    answer = ask_taker(four_v_three, "hand", 6, learners, num_keepers=4)
-    assert answer == (Action.MARK_KEEPER, 2, False)
-    four_v_three.age[2] = 13  # keeper 2 out of sight
-    answer = ask_taker(four_v_three, "hand", 6, learners, num_keepers=4)
-    assert answer == (Action.MARK_KEEPER, 3, False)
+    assert marked_by(four_v_three, 6) == 2
+    four_v_three.age[2] = 13
+    assert marked_by(four_v_three, 6) == 3
 
 
-def test_takers_out_of_sight_are_not_counted_on_to_chase(four_v_three):
+def test_while_the_ball_flies_the_lanes_begin_at_its_receiver(four_v_three):
+    # P: at the opponent fastest to the ball. From K2, T0 is in the lane to K0, T2 in that to K1.
+    four_v_three.cycles_to_ball[2] = 3
+    assert marked_by(four_v_three, 6) == 2
+    four_v_three.age[2] = 13
+    assert marked_by(four_v_three, 6) == 3
+
+
+def test_where_a_taker_is_out_of_sight_the_first_two_of_the_team_chase(four_v_three):
+    # P sortClosestTo sorts nothing where somebody is unknown
     four_v_three.age[4] = 13
-    answer = ask_taker(four_v_three, "hand", 6, takers(4, 3), num_keepers=4)
-    assert answer == (Action.GO_TO_BALL, NO_TARGET, False)
+    four_v_three.position[6] = (0.5, 0.0)  # T2 is nearest
+    assert [marked_by(four_v_three, taker) for taker in (4, 5, 6)] == [-1, -1, 0]
 
 
 def test_a_taker_that_sees_no_keeper_goes_to_the_ball(four_v_three):

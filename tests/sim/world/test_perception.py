@@ -11,7 +11,7 @@ from scenes import EXACT, Scene
 
 from keepaway_sim.world import hearing, memory, sight
 from keepaway_sim.world.config import NEVER, noiseless, profile
-from keepaway_sim.world.state import KICK
+from keepaway_sim.world.state import DASH, KICK, NONE, Command
 
 approx = pytest.approx
 
@@ -126,24 +126,6 @@ def test_what_lies_behind_is_felt_within_three_metres():
         assert scene.belief.age[0, 0, scene.ball] == age
 
 
-@pytest.mark.parametrize(("age", "felt"), [(12, True), (13, False)])
-def test_who_is_felt_has_no_name_unless_somebody_is_expected_there(age, felt):
-    scene = Scene("a . 1", NARROW)
-    scene.belief.age[0, 0, scene.index("a")] = age
-    scene.look("1")
-    assert (scene.belief.age[0, 0, scene.index("a")] == 0) == felt
-
-
-@pytest.mark.parametrize(("believed", "known"), [((5.0, 3.4), False), ((5.0, 3.6), True)])
-def test_who_is_not_where_it_must_be_seen_is_not_known_any_more(believed, known):
-    # at 34 and 36 degrees: inside the cone of 45 to each side by more and by less than 10
-    scene = Scene("1", NARROW)
-    scene.belief.age[0, 0, scene.index("a")] = 2
-    scene.belief.position[0, 0, scene.index("a")] = believed
-    scene.look("1")
-    assert (scene.belief.age[0, 0, scene.index("a")] == 2) == known
-
-
 @pytest.mark.parametrize(
     ("distance", "draws", "velocity"),
     [
@@ -235,20 +217,55 @@ def test_what_is_not_seen_rolls_on_and_ages():
     scene.move("o", 1.0, -0.5)
     scene.belief.age[0, 0, 1] = 3
     memory.remember(scene.w, 0, 0)
+    memory.roll_on(scene.w, 0, 0)
     belief = scene.belief
     assert belief.position[0, 0, 1] == approx([1.4, 0.0])
     assert belief.velocity[0, 0, 1] == approx([0.16, 0.0])  # player_decay 0.4
     assert belief.position[0, 0, scene.ball] == approx([12.0, 1.5])
     assert belief.velocity[0, 0, scene.ball] == approx([0.94, -0.47])
+    assert belief.position[0, 0, 2] == approx([10.0, 4.0])  # who is not known stays
     assert belief.age[0, 0].tolist() == [1, 4, NEVER, 1]
 
 
-def test_the_opponent_nearest_to_the_ball_is_believed_to_come_for_it():
-    scene = Scene("a . . . 1 . . . o . . . . . b")  # a is 8 m, b 6 m from the ball
-    scene.move("a", 0.4, 0.0)
-    memory.remember(scene.w, 0, 0)
-    assert scene.seen("1", "b") == approx([10.0 - 0.3, 0.0])
-    assert scene.seen("1", "a") == approx([-4.0 + 0.4, 0.0])
+def test_the_first_of_the_own_team_is_never_moved():
+    # P updateDynamicObjectForNextCycle leaves OBJECT_TEAMMATE_1 where it was seen
+    scene = Scene("1 . . . 2 . . 3 . o")
+    for name in "13":
+        scene.move(name, 0.4, 0.0)
+    memory.roll_on(scene.w, 0, 1)
+    assert scene.seen("2", "1") == approx([-4.0, 0.0])
+    assert scene.belief.velocity[0, 1, 0] == approx([0.4, 0.0])
+    assert scene.seen("2", "3") == approx([3.4, 0.0])
+
+
+def test_the_opponent_fastest_to_the_ball_is_believed_to_come_for_it():
+    # a is 8 m and b 6 m from where the ball is, but it rolls toward a
+    scene = Scene("a . . . 1 . . . o . . . . . b")
+    scene.move("o", -1.0, 0.0)
+    memory.roll_on(scene.w, 0, 0)
+    assert scene.seen("1", "a") == approx([-4.0 + 0.3, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("ball_vx", "drift"),
+    [(0.0, -0.25), (0.5, 0.25), (1.1, 0.5), (-0.5, -0.25), (-1.1, -0.5)],
+)
+def test_other_unseen_opponents_drift_along_x_with_the_ball(ball_vx, drift):
+    # P: toward -x of the own frame, unless the ball flies ahead; twice as far if it is fast
+    scene = Scene("1 . a . . . . . . . b")
+    scene.put("o", 2.0, 0.5)  # a has it
+    scene.move("o", ball_vx, 0.0)
+    scene.move("b", 0.4, 0.3)
+    memory.roll_on(scene.w, 0, 0)
+    assert scene.seen("1", "b") == approx([10.0 + drift, 0.0])
+
+
+def test_for_takers_the_drift_is_mirrored():
+    scene = Scene("a . 1 . . . . . . . 2")
+    scene.put("o", 2.0, 0.5)
+    scene.move("o", -0.5, 0.0)  # ahead for those who play toward -x
+    memory.roll_on(scene.w, 0, scene.index("a"))
+    assert scene.seen("a", "2") == approx([10.0 - 0.25, 0.0])
 
 
 def test_an_own_kick_is_part_of_what_is_expected():
@@ -307,8 +324,11 @@ HEARD = """
 """
 
 
-def say(scene: Scene, name: str) -> None:
-    hearing.speak(scene.w, 0, scene.index(name), False)
+STAY = Command(NONE, 0.0, 0.0)
+
+
+def say(scene: Scene, name: str, command: Command = STAY) -> None:
+    hearing.speak(scene.w, 0, scene.index(name), command)
 
 
 def hear(scene: Scene, name: str, uniform: float) -> None:
@@ -317,44 +337,85 @@ def hear(scene: Scene, name: str, uniform: float) -> None:
     hearing.hear(scene.w, 0, scene.index(name))
 
 
+@pytest.mark.parametrize(
+    ("value", "ahead", "told"),
+    [(0.0, True, -0.725), (7.0, True, 6.525), (7.9, True, 6.525), (8.0, True, 7.975)],
+)
+def test_a_message_cuts_numbers_to_the_lower_end_of_a_step(value, ahead, told):
+    # P: 73 steps of 1.45 m from -53 m on; 7.0 and 7.9 lie in the one from 6.525 to 7.975
+    assert hearing.cut(value, 1.45, ahead) == approx(told)
+    assert hearing.cut(-value, 1.45, not ahead) == approx(-told)  # who plays toward -x
+
+
 def test_a_player_speaks_of_the_ball_and_of_an_opponent_near_it():
     scene = Scene(HEARD, ROUNDED)
     scene.move("o", 0.5, 0.5)
     say(scene, "2")
-    # steps of 1.45 and 0.93 m: ball (7, 1) -> (7.25, 0.93), taker (5, 2) -> (4.35, 1.86)
-    assert scene.speech.ball[0, 1] == approx([7.25, 0.93, 0.0, 0.0])  # within reach: lies still
+    # steps of 1.45 and 0.93 m, y to the right: ball (7, 1) -> (6.525, 1.395)
+    still = [-0.037, 0.037]  # within reach: lies still, as well as that can be spelled
+    assert scene.speech.ball[0, 1] == approx([6.525, 1.395, *still])
     assert scene.speech.ball_age[0, 1] == 1
     assert scene.speech.opponent[0, 1] == scene.index("a")
-    assert scene.speech.opponent_position[0, 1] == approx([4.35, 1.86])
+    assert scene.speech.opponent_position[0, 1] == approx([3.625, 2.325])
     assert not scene.speech.own_said[0, 1]  # ten characters are full
 
 
-def test_a_player_far_from_all_speaks_of_itself():
+def test_a_player_far_from_all_speaks_of_where_it_will_be():
     scene = Scene(HEARD, ROUNDED)
     scene.lose("o", 2)
     scene.move("3", 0.4, 0.0)
-    say(scene, "3")
+    say(scene, "3", Command(DASH, 100.0, 0.0))
     assert scene.speech.ball_age[0, 2] == -1
     assert scene.speech.opponent[0, 2] == -1
     assert scene.speech.own_said[0, 2]
-    assert scene.speech.own[0, 2] == approx([13.05, 0.0])  # 12.4 m in steps of 1.45
+    assert scene.speech.own[0, 2] == approx([12.325, 0.465])  # 12 + 0.4 + 0.6 m, cut
 
 
-def test_a_message_helps_who_has_not_seen_the_ball_for_four_cycles():
+@pytest.mark.parametrize("age", [0, 1])
+def test_a_kick_is_announced_also_without_a_look(age):
+    # P makeSayMessage: where the ball will be, if it leaves reach by this kick
+    scene = Scene("1 o . . 2")
+    scene.put("o", 0.5, 0.0)
+    scene.lose("o", age)
+    say(scene, "1", Command(KICK, 100.0, 0.0))
+    assert scene.speech.ball_age[0, 0] == 0
+    x, y, vx, vy = scene.speech.ball[0, 0]
+    assert (x, y) == approx(scene.ball_after("1", (KICK, 100.0, 0.0)))
+    assert (vx, vy) == approx((0.94 * (x - 0.5), 0.0))
+    say(scene, "1", Command(KICK, 5.0, 0.0))  # stays in reach
+    assert scene.speech.ball_age[0, 0] == (1 if age == 0 else -1)
+
+
+def test_a_message_helps_who_has_not_seen_the_ball_move_for_four_cycles():
     scene = Scene(HEARD, ROUNDED)
+    scene.belief.cycle[0] = 20
     say(scene, "2")
-    for age, x in ((3, 7.0), (4, 7.25)):
+    for age, x in ((3, 7.0), (4, 6.525 - 0.037)):  # rolled on by the cycle of the message
         scene.believe()
-        scene.belief.age[0, 0, scene.ball] = age
+        scene.lose("o", age)
         hear(scene, "1", 0.1)
         assert scene.belief.position[0, 0, scene.ball, 0] == approx(x)
-    assert scene.belief.age[0, 0, scene.ball] == 1
+    assert scene.belief.age[0, 0, scene.ball] == 2
+
+
+@pytest.mark.parametrize(("age", "taken"), [(0, False), (1, True)])
+def test_a_kick_that_is_told_of_counts_for_who_does_not_see_the_ball_now(age, taken):
+    scene = Scene("1 . . . . . . 2 o")
+    scene.put("o", 7.5, 0.0)
+    scene.belief.cycle[0] = 20
+    scene.believe()
+    say(scene, "2", Command(KICK, 100.0, 0.0))
+    scene.lose("o", age)
+    hear(scene, "1", 0.1)
+    assert (scene.belief.velocity[0, 0, scene.ball, 0] > 1.0) == taken
+    assert scene.belief.age[0, 0, scene.ball] == (1 if taken else age)
 
 
 def test_who_is_near_the_ball_trusts_itself():
     scene = Scene(HEARD)
     say(scene, "2")
-    scene.belief.age[0, 0, scene.ball] = 8
+    scene.belief.cycle[0] = 20
+    scene.lose("o", 8)
     scene.belief.position[0, 0, scene.ball] = 2.9, 0.0
     hear(scene, "1", 0.1)
     assert scene.belief.position[0, 0, scene.ball] == approx([2.9, 0.0])
@@ -367,9 +428,9 @@ def test_one_message_a_cycle_is_heard_and_only_of_team_mates():
     scene.belief.age[0, 0] = [0, 9, 9, 9, 0]
     hear(scene, "1", 0.6)  # the second of two team-mates: 3
     assert scene.belief.age[0, 0].tolist() == [0, 9, 1, 9, 0]
-    assert scene.belief.position[0, 0, 2] == approx([11.6, 0.0])
-    hear(scene, "1", 0.4)  # 2 tells of the taker
-    assert scene.belief.age[0, 0].tolist() == [0, 9, 1, 1, 0]
+    assert scene.belief.position[0, 0, 2] == approx([10.875, 0.465])
+    hear(scene, "1", 0.4)  # 2 tells of the taker, as seen a cycle before
+    assert scene.belief.age[0, 0].tolist() == [0, 9, 1, 2, 0]
     before = scene.belief.position[0, 3].copy()
     hear(scene, "a", 0.5)  # has nobody to listen to
     np.testing.assert_array_equal(scene.belief.position[0, 3], before)

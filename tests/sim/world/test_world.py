@@ -5,12 +5,13 @@ import pickle
 
 import numpy as np
 import pytest
+from scenes import Scene
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.world.config import NEVER, Config, noiseless, profile
 from keepaway_sim.world.constants import pack
-from keepaway_sim.world.cycle import is_legal
+from keepaway_sim.world.cycle import _goes_on_passing, is_legal
 from keepaway_sim.world.physics import GRID
 from keepaway_sim.world.world import World
 
@@ -253,17 +254,30 @@ def test_kicks_of_several_players_add_up():
     assert world.truth.velocity[0, 3] == approx(0.94 * total, abs=1e-6)
 
 
-def test_a_pass_decision_is_carried_on_for_one_cycle_without_asking():
+def test_a_pass_goes_on_without_asking_until_the_ball_has_left():
+    # P keeperWithBall: continuing a pass counts as the last action, however often
     world = started(Task(3, 1), noiseless(profile("2005")), [1])
-    see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
     action = np.array([[PASS, OPEN, OPEN, GO]])
-    world.step(action, np.ones_like(action))  # the ball lies behind: it is set up first
-    assert world.belief.ball_kickable[0, 0]
-    assert world.belief.decision_due[0].tolist() == [False, True, True, True]
-    world.step(np.array([[77, OPEN, OPEN, GO]]), np.zeros_like(action))
+    for _ in range(3):
+        see(world, [(0, 0), (10, 0), (0, 11), (12, 12), (-0.9, 0)])
+        world.step(action, np.ones_like(action))  # the ball lies behind: it is set up first
+        assert world.belief.ball_kickable[0, 0]
+        assert world.belief.decision_due[0].tolist() == [False, True, True, True]
+        action = np.array([[77, OPEN, OPEN, GO]])  # who answers all the same is not heard
+    world.step(action, np.zeros_like(action))
     assert world.truth.action[0, 0] == PASS
     assert np.linalg.norm(world.truth.velocity[0, 4]) > 1.0
     assert world.belief.decision_due[0].all()
+
+
+def test_a_pass_is_forgotten_where_somebody_is_lost_from_sight():
+    scene = Scene("1 2 o")
+    scene.put("o", 0.5, 0.0)
+    scene.belief.cycle[0] = 20
+    for passed, lost, goes_on in ((19, 12, True), (18, 12, False), (19, 13, False)):
+        scene.memory.pass_cycle[0, 0] = passed
+        scene.lose("2", lost)
+        assert _goes_on_passing(scene.w, 0, 0) == goes_on
 
 
 @pytest.mark.parametrize(("by_rank", "receiver"), [(True, 2), (False, 1)])

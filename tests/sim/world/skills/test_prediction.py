@@ -111,7 +111,7 @@ def test_way_left_after_running_straight(cycles, left):
 def to_ball(x, y, ball, ball_v):
     body = Body(float(x), float(y), 0.0, 0.0, 1.0, 0.0)
     rolling = Ball(*(float(value) for value in (*ball, *ball_v)))
-    return prediction.cycles_to_ball(C, body, rolling, LIMIT)
+    return prediction.reach_ball(C, body, 0, rolling, LIMIT)[1]
 
 
 def test_a_ball_that_comes_is_reached_sooner():
@@ -141,18 +141,19 @@ def random_scenes(count):
         yield body, Ball(bx, by, fast * math.cos(rolls), fast * math.sin(rolls))
 
 
-def test_skipping_cycles_finds_the_first_in_which_the_ball_is_reached():
+@pytest.mark.parametrize("lead", [0, 2])
+def test_skipping_cycles_finds_the_first_in_which_the_ball_is_reached(lead):
     for body, ball in random_scenes(2000):
-        expected = NEVER
+        expected = NEVER, NEVER
         for i in range(2 * C.intercept_horizon):
             to = prediction.ball_ahead(C, ball, i)
-            needed = prediction.cycles_to_point(C, body, *to)
+            needed = max(prediction.cycles_to_point(C, body, *to) - lead, 0)
             if needed <= i:
-                expected = needed
+                expected = i, needed
                 break
-        assert prediction.cycles_to_ball(C, body, ball, LIMIT) == expected
-        if expected < NEVER:
-            assert prediction.cycles_to_ball(C, body, ball, expected - 1) == NEVER
+        assert prediction.reach_ball(C, body, lead, ball, LIMIT) == expected
+        if expected[0] < NEVER:
+            assert prediction.reach_ball(C, body, lead, ball, expected[0] - 1)[0] == NEVER
 
 
 def test_skipping_cycles_finds_the_first_meeting_point():
