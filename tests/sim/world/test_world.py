@@ -271,7 +271,7 @@ def test_a_pass_goes_on_without_asking_until_the_ball_has_left():
 
 
 def test_a_pass_is_forgotten_where_somebody_is_lost_from_sight():
-    scene = Scene("1 2 o")
+    scene = Scene("1 2 o a")
     scene.put("o", 0.5, 0.0)
     scene.belief.cycle[0] = 20
     for passed, lost, goes_on in ((19, 12, True), (18, 12, False), (19, 13, False)):

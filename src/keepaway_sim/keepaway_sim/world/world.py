@@ -88,7 +88,7 @@ class World:
         draws.cursor[field] = num
         belief.body[field] = truth.yaw[field, :, None]
         belief.neck[field], belief.position[field] = 0.0, 0.0
-        self.fields.memory.self_error[field] = 0.0
+        self.fields.memory.self_error[field] = self.fields.memory.seen[field] = 0.0
         truth.time[field], truth.running[field] = -1, True  # the kick-off takes it to 0
         belief.episode[field], belief.outcome[field] = -1, Outcome.ABORTED
         self._settle(np.arange(self.num_fields) == field)

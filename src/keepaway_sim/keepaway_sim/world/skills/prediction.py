@@ -19,6 +19,7 @@ SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
 BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
 UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
+TURNS = 3  # [cycles] of turning that a player may be spared where the ball comes its way
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
@@ -318,7 +319,7 @@ def reach_ball(c, body, lead, ball, limit):
         if needed <= i:
             return i, needed
         left = _left_of_speed(c, c.ball_roll[i])
-        i += max(int((needed - i) / (1.0 + speed * left)), 1)
+        i += max(int((needed - TURNS - i) / (1.0 + speed * left)), 1)
     return NEVER, NEVER
 
 
