@@ -138,8 +138,8 @@ def test_an_opponent_who_is_not_felt_is_just_out_of_touch():
 )
 def test_a_ball_that_is_not_where_it_must_be(ball, taker, seen_ago, place):
     scene = Scene("1 a o", NARROW)
-    expect(scene, "o", *ball, 3)
-    expect(scene, "a", *taker, seen_ago)
+    expect(scene, "o", ball[0], ball[1], 3)
+    expect(scene, "a", taker[0], taker[1], seen_ago)
     ghosts._remove_ghost_ball(scene.w, 0, 0)
     assert scene.belief.age[0, 0, scene.ball] == (NEVER if place is None else 3)
     if place:

@@ -166,7 +166,8 @@ def separated(places, radii, velocity=None):
     moving = np.array(velocity, dtype=float) if velocity else np.ones_like(position)
     num = len(radii)
     places, none = np.zeros((num, 2)), np.zeros(1)
-    scratch = Scratch(places.copy(), places, np.zeros(num), np.zeros(num, dtype=np.bool_), none)
+    collided = np.zeros(num, dtype=np.bool_)
+    scratch = Scratch(places.copy(), places, np.zeros(num), collided, none, places.copy())
     physics.separate(position, moving, np.array(radii), scratch)
     return position, moving
 

@@ -77,7 +77,8 @@ class Witness:
 def _distances(position: np.ndarray, keeper: int, num_keepers: int) -> np.ndarray:
     """(1 + num_takers,) a keeper's distance to the centre and, in order, to the takers [m]."""
     own, takers = position[keeper], position[num_keepers:-1]
-    return np.r_[np.hypot(*own), np.sort(np.hypot(*(takers - own).T))]
+    away = np.sort(np.hypot(*(takers - own).T))
+    return np.asarray(np.r_[np.hypot(*own), away])
 
 
 def learn_in_stages(
@@ -150,7 +151,9 @@ def behaviour(stage: Stage) -> dict[str, float]:
         "hold_share": num_holds / (num_holds + num_passes),
         "passes_per_episode": num_passes / num_episodes,
         "received_by_other": received / num_episodes,
-        "hold_cycles_before_pass": float(np.mean([_holds_before(held, same, k) for k in first])),
+        "hold_cycles_before_pass": float(
+            np.mean([_holds_before(held, same, int(k)) for k in first])
+        ),
         "s_between_passes": float(after.mean() * CYCLE_TIME),
         "setup_cycles_per_pass": int(held.passes.sum()) / num_passes - 1.0,
     }
