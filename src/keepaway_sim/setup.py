@@ -16,8 +16,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml", "fastdds.xml"]),
-        (f"share/{name}/launch", ["launch/match.launch.py"]),
         (f"share/{name}/foxglove", ["foxglove/keepaway.json"]),
+        (f"share/{name}/rviz", ["rviz/keepaway.rviz"]),
     ],
     entry_points={
         "console_scripts": [

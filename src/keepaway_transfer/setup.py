@@ -16,6 +16,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml"]),
+        (f"share/{name}/launch", ["launch/match.launch.py"]),
     ],
     entry_points={
         "console_scripts": [

@@ -78,7 +78,7 @@ def test_every_file_of_a_package_is_installed(
 
 
 def test_ros2_launch_finds_the_match(workspace: Workspace) -> None:
-    share = workspace.install / "keepaway_sim" / "share" / "keepaway_sim"
+    share = workspace.install / "keepaway_transfer" / "share" / "keepaway_transfer"
     assert (share / "launch" / "match.launch.py").is_file()
 
 
