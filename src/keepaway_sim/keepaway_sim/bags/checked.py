@@ -62,7 +62,8 @@ def read_agents(text: str) -> dict[str, dict[str, Any]]:
         raise KeepawayError("info 'agents' is not an object of settings by player")
     for name, settings in agents.items():
         for key, value in settings.items():
-            if not isinstance(value, str | int | float | bool | None):
+            words = value if isinstance(value, list) else [value]
+            if not all(isinstance(word, str | int | float | bool | None) for word in words):
                 raise KeepawayError(f"info 'agents': {shown(name)}.{shown(key)} is no plain value")
     return agents
 

@@ -27,6 +27,7 @@ from keepaway_sim.world.config import NEVER
 
 NONE = -32768
 """In a frame: not known."""
+_CYCLES = 2**15  # a frame has a cycle's number in two parts: below this, and how often this
 MAX_CYCLES = 12_000
 """Cycles in a page if its episodes are not chosen: about 5 MB of 3v2."""
 
@@ -40,6 +41,7 @@ def layout(task: Task) -> tuple[dict[str, int], int]:
     num, objects = task.num_players, task.num_players + 1
     counts = {
         "cycle": 1,
+        "cycle_high": 1,
         "outcome": 1,
         "position": 2 * objects,
         "yaw": num,
@@ -59,7 +61,8 @@ def layout(task: Task) -> tuple[dict[str, int], int]:
 def frames(track: Track, task: Task) -> np.ndarray:
     """A track as the page wants it: (num_cycles, size) int16."""
     scaled = {
-        "cycle": track.cycle,
+        "cycle": track.cycle % _CYCLES,
+        "cycle_high": track.cycle // _CYCLES,
         "outcome": track.outcome,
         "position": 100 * track.position,
         "yaw": 1e4 * track.yaw,
@@ -89,8 +92,21 @@ def encoded(rows: np.ndarray) -> str:
     return base64.b64encode(rows.astype("<i2").tobytes()).decode()
 
 
-def match_data(match: Mapping[str, Any], facts: Sequence[str] = ()) -> dict[str, Any]:
-    """What the page must know of a match (a Match message's fields)."""
+def match_data(
+    match: Mapping[str, Any],
+    facts: Sequence[str] = (),
+    agents: Mapping[str, Mapping[str, Any]] | None = None,
+) -> dict[str, Any]:
+    """What the page must know of a match.
+
+    Args:
+        match: a Match message's fields.
+        facts: more to be told of it.
+        agents: the settings of every player, by name, where they are known.
+
+    Raises:
+        KeepawayError: fields that make no sense.
+    """
     task = check_match(match)
     starts, size = layout(task)
     angle = math.degrees(match["visible_angle"])
@@ -102,6 +118,10 @@ def match_data(match: Mapping[str, Any], facts: Sequence[str] = ()) -> dict[str,
         "field_width": task.field_width,
         "cycle_time": match["cycle_time"],
         "visible_angle": match["visible_angle"],
+        "orderings": [
+            "k1" if (agents or {}).get(name, {}).get("ordering") == "k1" else "ball"
+            for name in match["player_names"]
+        ],
         "facts": [
             f"seed {match['seed']}",
             f"{task.field_length:g} × {task.field_width:g} m",
@@ -160,8 +180,12 @@ def replay_page(
         episode_data(e) | ({"frames": shown[e.number]} if e.number in shown else {})
         for e in episodes
     ]
-    facts = _who_played(bag)
-    data = {"live": False, "match": match_data(bag.match, [*facts, gaps]), "episodes": entries}
+    agents, facts = _who_played(bag)
+    data = {
+        "live": False,
+        "match": match_data(bag.match, [*facts, gaps], agents),
+        "episodes": entries,
+    }
     return page(data), gaps
 
 
@@ -171,7 +195,7 @@ def page(data: Mapping[str, Any]) -> str:
     parts = {
         "title": html.escape(f"Keepaway {match['task']}" if match else "Keepaway, live"),
         "css": _part("page.css"),
-        "script": _part("page.js"),
+        "script": _part("pure.js") + _part("page.js"),
         "data": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
     made = _part("page.html")
@@ -203,12 +227,16 @@ def chosen_episodes(
     return {episode.number for episode in episodes[::every]}
 
 
-def _who_played(bag: MatchBag) -> list[str]:
-    """How each team played, or why that is not known: the match can be watched all the same."""
+def _who_played(bag: MatchBag) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """The players' settings, and how each team played in words.
+
+    Where the bag's are no settings, the words say so: the match can be watched all the same.
+    """
     try:
-        return [f"{role} {policy}" for role, policy in _policies(bag.agents).items()]
+        teams = _policies(bag.agents).items()
+        return bag.agents, [f"{role} {policy}" for role, policy in teams]
     except KeepawayError as error:
-        return [str(error)]
+        return {}, [str(error)]
 
 
 def _policies(agents: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

@@ -1,11 +1,10 @@
-"use strict";
-// A recorded match, or one that is on, to watch. Made by keepaway_sim.viewer, which describes the data.
+// A recorded match, or a running one, to watch. keepaway_sim.view.page describes the data.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
 const ACTIONS = ["holds", "passes to", "gets open", "goes to the ball", "marks"];
 const OUTCOMES = ["in play", "taken away", "out of bounds", "aborted"];
-const NONE = -32768, HOLD = 0, PASS = 1, MARK = 4;
+const NONE = -32768, PASS = 1, MARK = 4;
 const TRAIL = 25; // cycles
 const GLANCE = 4; // metres to which the views of players who are not chosen are drawn
 const MARGIN = 1.6; // metres around the field
@@ -28,19 +27,11 @@ const view = {
 
 // --- data ---------------------------------------------------------------------------------------
 
-function decode(text) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  return new Int16Array(bytes.buffer);
-}
-
-function framesOf(text) {
-  const all = decode(text), size = match.frame_size, frames = [];
-  for (let at = 0; at < all.length; at += size) frames.push(all.subarray(at, at + size));
-  return frames;
-}
-
+/** An episode of the list; what it looked like is unpacked when it is watched. */
 function addEpisode(entry) {
-  const episode = { ...entry, frames: entry.frames ? framesOf(entry.frames) : [] };
+  const { frames: text, ...told } = entry;
+  const episode = { ...told, playable: Boolean(text), frames: [] };
+  if (text) whenAskedFor(episode, "frames", () => framesOf(text, match.frame_size));
   byNumber.set(episode.number, episodes.length);
   episodes.push(episode);
   return episode;
@@ -52,7 +43,8 @@ const ballIndex = () => match.names.length;
 const isKeeper = (player) => player < match.num_keepers;
 const current = () => episodes[view.episode];
 const lastFrame = () => Math.max(0, (current()?.frames.length ?? 0) - 1);
-const seconds = (frame) => field(frame, "cycle") * match.cycle_time;
+const cycleOf = (frame) => cycleNumber(field(frame, "cycle"), field(frame, "cycle_high"));
+const seconds = (frame) => cycleOf(frame) * match.cycle_time;
 
 /** Where an object is at the view's moment: [x, y] in metres, between the two frames around it. */
 function place(object, observer = -1) {
@@ -92,15 +84,14 @@ function inWords({ action, target }) {
   return ACTIONS[action] + whom;
 }
 
-/** The keepers that an action value's index stands for: others by believed distance to the ball. */
+/** The keepers that a player's action values stand for, as its learner ranked them. */
 function rankedKeepers(frame, player) {
-  const spot = (object) => 2 * (player * objects() + object);
-  const at = (object) => [field(frame, "believed", spot(object)), field(frame, "believed", spot(object) + 1)];
-  const [bx, by] = at(ballIndex());
-  const far = (k) => Math.hypot(at(k)[0] - bx, at(k)[1] - by);
-  const keepers = match.names.map((_, k) => k).filter((k) => isKeeper(k));
-  const ranked = keepers.filter((k) => k !== player).sort((a, b) => far(a) - far(b));
-  return isKeeper(player) ? ranked : ranked.slice(1);
+  const at = (object) => {
+    const spot = 2 * (player * objects() + object);
+    return [field(frame, "believed", spot), field(frame, "believed", spot + 1)];
+  };
+  const places = Array.from({ length: objects() }, (_, object) => at(object));
+  return ranked(places, match.num_keepers, player, match.orderings[player]);
 }
 
 // --- drawing the field ---------------------------------------------------------------------------
@@ -277,7 +268,7 @@ function tell() {
   $("scrub").max = lastFrame();
   $("scrub").value = view.frame;
   main.dataset.episode = episode.number;
-  main.dataset.cycle = field(frame, "cycle");
+  main.dataset.cycle = cycleOf(frame);
   main.dataset.playing = view.playing;
   const outcome = field(frame, "outcome");
   $("banner").hidden = !outcome;
@@ -298,7 +289,7 @@ const nick = (player) => (isKeeper(player) ? "K" : "T") + match.names[player].sp
 
 let mindTold = null;
 function tellMind(frame) {
-  const told = `${view.player} ${current().number} ${field(frame, "cycle")}`;
+  const told = `${view.player} ${current().number} ${cycleOf(frame)}`;
   if (told === mindTold) return;
   mindTold = told;
   const mind = $("mind"), me = view.player;
@@ -395,24 +386,14 @@ function listRow(k, top, high) {
   row.dataset.number = episode.number;
   row.style.cssText = `position:absolute;left:0;right:0;top:${top}px;height:${high}px`;
   row.setAttribute("aria-selected", k === view.episode);
-  row.setAttribute("aria-disabled", !episode.frames.length);
+  row.setAttribute("aria-disabled", !episode.playable);
   const off = { 1: " from ", 2: " off " }[episode.outcome];
   const lost = off && episode.lostBy >= 0 ? off + nick(episode.lostBy) : "";
   const cells = [`#${episode.number}`, `${episode.duration.toFixed(1)} s`, OUTCOMES[episode.outcome] + lost];
   cells.forEach((text) => { const cell = document.createElement("span"); cell.textContent = text; row.append(cell); });
-  if (!episode.frames.length) row.title = "not in this page: choose it with view.py --episodes";
+  if (!episode.playable) row.title = "not in this page: choose it with view.py --episodes";
   row.onclick = () => select(k);
   return row;
-}
-
-function movingMean(values, window) {
-  const means = [];
-  let sum = 0;
-  values.forEach((value, k) => {
-    sum += value - (k >= window ? values[k - window] : 0);
-    means.push(sum / Math.min(k + 1, window));
-  });
-  return means;
 }
 
 function drawCurve() {
@@ -425,11 +406,10 @@ function drawCurve() {
   const rem = parseFloat(getComputedStyle(document.documentElement).fontSize) * ratio;
   const left = 2.1 * rem, bottom = board.height - 1.3 * rem, top = 0.4 * rem;
   const durations = finished.map((episode) => episode.duration);
-  const sorted = [...durations].sort((a, b) => a - b);
-  const high = Math.max(1, sorted[Math.floor(0.98 * (sorted.length - 1))] * 1.1);
+  const high = chartTop(durations);
   const x = (k) => left + ((k + 0.5) / finished.length) * (board.width - left - 0.4 * rem);
   const y = (value) => bottom - (Math.min(value, high) / high) * (bottom - top);
-  curveAxes(ink, { left, bottom, top, rem, high, y, width: board.width, finished });
+  curveAxes(ink, { left, bottom, rem, high, y, width: board.width, finished });
   const size = Math.max(1.2, Math.min(0.22 * rem, (0.3 * board.width) / finished.length)) ;
   finished.forEach((episode, k) => {
     ink.globalAlpha = finished.length > 300 ? 0.35 : 0.8;
@@ -463,7 +443,7 @@ function drawCurve() {
   };
 }
 
-function curveAxes(ink, { left, bottom, top, rem, high, y, width, finished }) {
+function curveAxes(ink, { left, bottom, rem, high, y, width, finished }) {
   ink.font = `${0.72 * rem}px system-ui, sans-serif`;
   ink.fillStyle = css("--quiet");
   ink.strokeStyle = css("--line");
@@ -488,7 +468,7 @@ function curveAxes(ink, { left, bottom, top, rem, high, y, width, finished }) {
 /** Select the playable episode nearest to one that may not be in the page. */
 function selectNearest(episode) {
   const at = byNumber.get(episode.number);
-  const near = episodes.map((_, k) => k).filter((k) => episodes[k].frames.length);
+  const near = episodes.map((_, k) => k).filter((k) => episodes[k].playable);
   near.sort((a, b) => Math.abs(a - at) - Math.abs(b - at));
   if (near.length) select(near[0]);
 }
@@ -496,7 +476,7 @@ function selectNearest(episode) {
 // --- moving about ----------------------------------------------------------------------------------
 
 function select(k, frame = 0) {
-  if (!episodes[k]?.frames.length) return;
+  if (!episodes[k]?.playable) return;
   view.episode = k;
   view.frame = frame;
   view.following = false;
@@ -515,7 +495,7 @@ function reveal() {
 
 function selectNeighbour(direction) {
   for (let k = view.episode + direction; k >= 0 && k < episodes.length; k += direction)
-    if (episodes[k].frames.length) return select(k);
+    if (episodes[k].playable) return select(k);
   return undefined;
 }
 
@@ -557,7 +537,7 @@ function step(cycles) {
     waited = 0;
   } else {
     waited += cycles;
-    const next = episodes.findIndex((episode, k) => k > view.episode && episode.frames.length);
+    const next = episodes.findIndex((episode, k) => k > view.episode && episode.playable);
     if (next < 0) { if (!data.live) setPlaying(false); return; }
     if (waited > 10 * view.speed) { waited = 0; select(next); }
   }
@@ -590,6 +570,14 @@ function wholeScreen() {
   else document.documentElement.requestFullscreen?.();
 }
 
+/** Dark where it was light, and the other way round; before, it is as the system has it. */
+function changeTheme() {
+  const { dataset } = document.documentElement;
+  const isDark = dataset.theme ? dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  dataset.theme = isDark ? "light" : "dark";
+  refresh();
+}
+
 const KEYS = {
   " ": () => setPlaying(!view.playing),
   ArrowLeft: (shift) => seek(Math.ceil(view.frame - 1e-6) - (shift ? 10 : 1)),
@@ -605,6 +593,7 @@ const KEYS = {
   v: () => toggle("cones"),
   b: () => toggle("belief"),
   n: () => toggle("names"),
+  d: changeTheme,
   f: wholeScreen,
   "?": () => $("help").click(),
   ...Object.fromEntries([...Array(10).keys()].map((k) => [String(k), () => choosePlayer(k - 1)])),
@@ -663,6 +652,7 @@ function connect() {
   $("play").onclick = () => setPlaying(!view.playing);
   $("scrub").oninput = () => seek(Number($("scrub").value));
   $("whole").onclick = wholeScreen;
+  $("theme").onclick = changeTheme;
   $("help").onclick = () => {
     $("keys").hidden = !$("keys").hidden;
     $("help").setAttribute("aria-expanded", !$("keys").hidden);
@@ -685,7 +675,7 @@ function begin() {
   data.episodes.forEach(addEpisode);
   describe();
   choosePlayer(0);
-  const first = episodes.findIndex((episode) => episode.frames.length);
+  const first = episodes.findIndex((episode) => episode.playable);
   if (first >= 0) select(first);
   layOut();
   drawList();
@@ -711,10 +701,11 @@ function onFrame(number, text) {
   if (at === undefined) {
     addEpisode({ number, duration: 0, outcome: 0, lostBy: -1 });
     at = episodes.length - 1;
-    if (episodes.length > KEPT) episodes[episodes.length - KEPT - 1].frames = [];
+    if (episodes.length > KEPT) Object.assign(episodes[episodes.length - KEPT - 1], { frames: [], playable: false });
   }
   const episode = episodes[at];
   episode.frames.push(decode(text));
+  episode.playable = true;
   episode.duration = Math.max(episode.duration, seconds(episode.frames[episode.frames.length - 1]));
   if (!view.following) return;
   const isNew = view.episode !== at;
@@ -727,7 +718,7 @@ function onFrame(number, text) {
 function onEpisode(said) {
   const at = byNumber.get(said.number);
   if (at === undefined) addEpisode(said);
-  else Object.assign(episodes[at], said, { frames: episodes[at].frames });
+  else Object.assign(episodes[at], said);
   drawList();
   drawCurve();
 }
