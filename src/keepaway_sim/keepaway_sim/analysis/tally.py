@@ -87,9 +87,9 @@ class Analyst:
         """Begin with nothing counted.
 
         Raises:
-            KeepawayError: the match's configuration is not one that this version knows.
+            KeepawayError: the match's configuration does not tell from how near a ball is kicked.
         """
-        task, physics = bag.task, bag.config.physics
+        task = bag.task
         self.bag, self.gaps = bag, gap_counter(bag)
         self.tally = Tally(
             passes=np.zeros((task.num_keepers, task.num_keepers), dtype=np.int64),
@@ -98,7 +98,7 @@ class Analyst:
             durations=[],
             outcomes=[],
         )
-        self._reach = physics.player_size + physics.ball_size + physics.kickable_margin
+        self._reach = bag.kickable_distance
         self._partial: dict[int, _Partial] = {}
         self._last = (-1, -1)  # episode, and the last keeper in it that had the ball
         counts = bag.reader.counts

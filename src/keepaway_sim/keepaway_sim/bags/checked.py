@@ -68,6 +68,25 @@ def read_agents(text: str) -> dict[str, dict[str, Any]]:
     return agents
 
 
+def kickable_distance(config: Any) -> float:
+    """From how near [m] a player kicks the ball, by a configuration of any version.
+
+    Raises:
+        KeepawayError: it does not tell.
+    """
+    physics = config.get("physics") if isinstance(config, dict) else None
+    parts = [
+        physics.get(name) if isinstance(physics, dict) else None
+        for name in ("player_size", "ball_size", "kickable_margin")
+    ]
+    total = 0.0
+    for part in parts:
+        if not isinstance(part, int | float) or not 0 <= part < _FARTHEST:
+            raise KeepawayError("config_json does not tell from how near a player kicks the ball")
+        total += part
+    return total
+
+
 def check_match(values: Mapping[str, Any]) -> Task:
     """The task of a Match message's fields.
 

@@ -123,6 +123,19 @@ class MatchBag:
         except (KeepawayError, OverflowError, AttributeError) as error:
             raise KeepawayError(f"{self.reader.path}: {error}") from error
 
+    @property
+    def kickable_distance(self) -> float:
+        """From how near [m] a player kicks the ball; also of a configuration of other versions.
+
+        Raises:
+            KeepawayError: the bag's configuration does not tell it.
+        """
+        try:
+            data = checked.read_json(self.match["config_json"], "config_json")
+            return checked.kickable_distance(data)
+        except KeepawayError as error:
+            raise KeepawayError(f"{self.reader.path}: {error}") from error
+
     @functools.cached_property
     def agents(self) -> dict[str, dict[str, Any]]:
         """The settings of every player, by name, where the bag says who played; else empty.

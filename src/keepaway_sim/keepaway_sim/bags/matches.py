@@ -238,7 +238,7 @@ def _layouts(reader: BagReader, match: Found) -> dict[int, Any]:
         codec = reader.codec_of(number)
         try:
             rows.check_fields(codec, _KEY_FIELDS[expected], {})
-            if {*_KEY_FIELDS[expected]} - {*(codec.head().names or ())}:
+            if {*_KEY_FIELDS[expected]} - {*(codec.front({}).names or ())}:
                 raise KeepawayError("its definition begins otherwise than this version's")
         except KeepawayError as error:
             raise KeepawayError(f"{reader.path}: {topic.name}: {error}") from error

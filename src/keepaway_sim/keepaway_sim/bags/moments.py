@@ -163,7 +163,7 @@ class Sorter:
     def _requests(
         self, codec: Codec, data: bytes, found: np.ndarray, player: int
     ) -> list[np.ndarray]:
-        if "action_values.length" not in (codec.dtype({}).names or ()):
+        if "action_values.length" not in (codec.front({}).names or ()):
             pieces = [rows.whole(codec, data, found, {})]
         else:
             counts = rows.lengths(codec, data, found, "action_values")

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.wire.cdr import HEADER, PAYLOAD, Codec, codec
+from keepaway_sim.wire.cdr import HEADER, Codec, codec
 
 
 def fronts(layout: Codec, data: bytes, rows: np.ndarray) -> np.ndarray:
-    """(n,) the fixed fields that messages begin with.
+    """(n,) the fields that messages begin with, up to the first of their sequences.
 
     Args:
         layout: of the messages.
@@ -21,7 +21,7 @@ def fronts(layout: Codec, data: bytes, rows: np.ndarray) -> np.ndarray:
     Raises:
         KeepawayError: a message that is shorter.
     """
-    return _taken(layout, layout.head(), data, rows)
+    return _taken(layout, layout.front({}), data, rows)
 
 
 def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, int]) -> np.ndarray:
@@ -30,23 +30,13 @@ def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, in
     Raises:
         KeepawayError: a message whose sequences have not.
     """
-    taken = _taken(layout, layout.dtype(lengths), data, rows)
+    taken = _taken(layout, layout.front(lengths), data, rows)
     for name, length in lengths.items():
         found = taken[f"{name}.length"]
         if (found != length).any():
             other = int(found[found != length][0])
             raise KeepawayError(f"{layout.message_type}: {other} {name}, where {length} should be")
-    sizes = rows[:, 3] - rows[:, 2]
-    if (sizes > taken.itemsize + _text_sizes(taken, lengths) + PAYLOAD).any():
-        raise KeepawayError(f"{layout.message_type} of {int(sizes.max())} bytes, longer than it is")
     return taken
-
-
-def _text_sizes(taken: np.ndarray, lengths: Mapping[str, int]) -> np.ndarray:
-    """(n,) bytes of the strings at messages' ends, which are left unread: a header's frame."""
-    names = [name for name in taken.dtype.names or () if name.endswith(".length")]
-    unread = [name for name in names if name.removesuffix(".length") not in lengths]
-    return sum((taken[name].astype(np.int64) for name in unread), np.zeros(len(taken), np.int64))
 
 
 def check_fields(layout: Codec, names: tuple[str, ...], lengths: Mapping[str, int]) -> None:
@@ -55,18 +45,12 @@ def check_fields(layout: Codec, names: tuple[str, ...], lengths: Mapping[str, in
     Raises:
         KeepawayError: it has not.
     """
-    ours = codec(layout.message_type).dtype(lengths)
-    known = {name: length for name, length in lengths.items() if _has_sequence(layout, name)}
-    theirs = layout.dtype(known)
+    ours, theirs = codec(layout.message_type).front(lengths), layout.front(lengths)
     for name in names:
         if name not in (theirs.names or ()):
             raise KeepawayError(f"its definition of {layout.message_type} lacks {name}")
         if theirs[name] != ours[name]:
             raise KeepawayError(f"{name} of its {layout.message_type} has another type")
-
-
-def _has_sequence(layout: Codec, name: str) -> bool:
-    return f"{name}.length" in (layout.dtype({}).names or ())
 
 
 def _taken(layout: Codec, dtype: np.dtype[np.void], data: bytes, rows: np.ndarray) -> np.ndarray:
@@ -87,7 +71,7 @@ def _taken(layout: Codec, dtype: np.dtype[np.void], data: bytes, rows: np.ndarra
 
 def lengths(layout: Codec, data: bytes, rows: np.ndarray, name: str) -> np.ndarray:
     """(n,) the lengths of a sequence, the first one in the message."""
-    found: np.ndarray = _taken(layout, layout.dtype({}), data, rows)[f"{name}.length"]
+    found: np.ndarray = _taken(layout, layout.front({}), data, rows)[f"{name}.length"]
     return found
 
 

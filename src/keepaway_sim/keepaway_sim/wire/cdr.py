@@ -12,7 +12,6 @@ rmw_fastrtps use it; https://mcap.dev/spec/registry for `ros2msg`.
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 import os
 import re
@@ -116,15 +115,19 @@ class Codec:
         except (RecursionError, OverflowError, ValueError, MemoryError) as error:
             raise KeepawayError(f"{self.message_type} has no layout: {error}") from error
 
-    def head(self) -> np.dtype[np.void]:
-        """The fields at a message's front that are at the same place in every message.
+    def front(self, lengths: Mapping[str, int]) -> np.dtype[np.void]:
+        """The fields that have one place in all messages whose first sequences have these lengths.
+
+        It ends before the first string, with the length of the first sequence that is not named.
+
+        Args:
+            lengths: of sequences.
 
         Raises:
             KeepawayError: the definition nests without end.
         """
         try:
-            front = list(itertools.takewhile(self._is_fixed, self._root))
-            return self._laid_out(self._leaves(front, "", {}), 0)
+            return self._laid_out(self._front(lengths), 0)
         except (RecursionError, OverflowError, ValueError, MemoryError) as error:
             raise KeepawayError(f"{self.message_type} has no layout: {error}") from error
 
@@ -155,6 +158,16 @@ class Codec:
         if field.type == "string" or field.is_array:
             return False
         return all(map(self._is_fixed, self._messages[field.type]))
+
+    def _front(self, lengths: Mapping[str, int]) -> Iterator[tuple[str, Any, int]]:
+        for field in self._root:
+            if field.is_array and field.size is None and field.name not in lengths:
+                yield f"{field.name}.length", "<u4", 4
+                return
+            is_known = field.type in _PRIMITIVES and field.name in lengths
+            if not is_known and not self._is_fixed(field):
+                return
+            yield from self._leaves([field], "", lengths)
 
     @staticmethod
     def _laid_out(leaves: Iterator[tuple[str, Any, int]], size: int) -> np.dtype[np.void]:
