@@ -28,6 +28,37 @@ class NetworkConfig:
     learn_after: int = 1000  # choices before the first training step
 
 
+class Replay:
+    """The last choices of `num_learners` learners, and what they led to; a ring for each."""
+
+    def __init__(self, num_learners: int, num_inputs: int, size: int) -> None:
+        """Nothing is remembered yet."""
+        shape, self._size = (num_learners, size), size
+        self._rings: tuple[np.ndarray, ...] = (
+            np.zeros((*shape, num_inputs), np.float32),  # states
+            np.zeros(shape, np.int64),  # actions
+            np.zeros(shape, np.float32),  # rewards
+            np.zeros(shape, np.float32),  # discounts
+            np.zeros((*shape, num_inputs), np.float32),  # next states
+        )
+        self._rows = np.arange(num_learners)
+        self.num_stored = np.zeros(num_learners, np.int64)
+
+    def store(self, who: np.ndarray, *choice: np.ndarray) -> None:
+        """Remember a choice of each of (num_learners,) bool `who`; see `QNetworks.learn`."""
+        rows = np.flatnonzero(who)
+        at = self.num_stored[rows] % self._size
+        for ring, new in zip(self._rings, choice, strict=True):
+            ring[rows, at] = new[rows]
+        self.num_stored[rows] += 1
+
+    def sample(self, rng: np.random.Generator, batch: int) -> list[np.ndarray]:
+        """Choices drawn evenly, (num_learners, batch, ..): what `store` was given, in order."""
+        filled = np.minimum(self.num_stored, self._size)
+        picked = (rng.random((len(self._rows), batch)) * filled[:, None]).astype(np.int64)
+        return [ring[self._rows[:, None], picked] for ring in self._rings]
+
+
 class QNetworks:
     """`num_learners` networks that value `num_actions` choices in a state, and what they remember.
 
@@ -53,19 +84,16 @@ class QNetworks:
         self._target = [layer.copy() for layer in self.layers]
         self._moments = [(np.zeros_like(layer), np.zeros_like(layer)) for layer in self.layers]
         self._rng, self._num_learners, self._num_updates = rng, num_learners, 0
-        self._rows = np.arange(num_learners)
-        memory = (num_learners, self.config.memory)
-        self._states = np.zeros((*memory, num_inputs), np.float32)
-        self._next_states = np.zeros((*memory, num_inputs), np.float32)
-        self._actions = np.zeros(memory, np.int64)
-        self._rewards = np.zeros(memory, np.float32)
-        self._discounts = np.zeros(memory, np.float32)
-        self._num_stored = np.zeros(num_learners, np.int64)
+        self._replay = Replay(num_learners, num_inputs, self.config.memory)
         self._num_choices = 0
+
+    def values(self, states: np.ndarray) -> np.ndarray:
+        """(num_learners, num_actions) in (num_learners, num_inputs) states."""
+        return values_of(self.layers, states[:, None, :])[-1][:, 0]
 
     def choose(self, states: np.ndarray, epsilon: float) -> np.ndarray:
         """Choices (num_learners,) in (num_learners, num_inputs) states, some of them at random."""
-        values = values_of(self.layers, states[:, None, :])[-1][:, 0]
+        values = self.values(states)
         explores = self._rng.random(self._num_learners) < epsilon
         any_action = self._rng.integers(values.shape[1], size=self._num_learners)
         return np.where(explores, any_action, values.argmax(axis=1))
@@ -88,39 +116,37 @@ class QNetworks:
             discounts: of what comes after; 0 at an episode's end.
             next_states: seen now.
         """
-        rows = np.flatnonzero(who)
-        at = self._num_stored[rows] % self.config.memory
-        for memory, new in (
-            (self._states, states),
-            (self._actions, actions),
-            (self._rewards, rewards),
-            (self._discounts, discounts),
-            (self._next_states, next_states),
-        ):
-            memory[rows, at] = new[rows]
-        self._num_stored[rows] += 1
+        self._replay.store(who, states, actions, rewards, discounts, next_states)
         self._num_choices += 1
-        if self._num_stored.min() < self.config.learn_after:
+        if self._replay.num_stored.min() < self.config.learn_after:
             return
         if self._num_choices % self.config.train_every == 0:
-            self._train()
+            self.train(*self._replay.sample(self._rng, self.config.batch))
         if self._num_choices % self.config.copy_every == 0:
-            self._target = [layer.copy() for layer in self.layers]
+            self.copy_target()
 
-    def _train(self) -> None:
-        filled = np.minimum(self._num_stored, self.config.memory)
-        shape = (self._num_learners, self.config.batch)
-        picked = (self._rng.random(shape) * filled[:, None]).astype(np.int64)
-        at = (self._rows[:, None], picked)
-        states, next_states = self._states[at], self._next_states[at]
+    def copy_target(self) -> None:
+        """Let the slow copy catch up."""
+        self._target = [layer.copy() for layer in self.layers]
+
+    def train(
+        self,
+        states: np.ndarray,
+        actions: np.ndarray,
+        rewards: np.ndarray,
+        discounts: np.ndarray,
+        next_states: np.ndarray,
+    ) -> None:
+        """A step of training on (num_learners, batch, ..) remembered choices."""
         best = values_of(self.layers, next_states)[-1].argmax(axis=2)[..., None]
         after = np.take_along_axis(values_of(self._target, next_states)[-1], best, axis=2)[..., 0]
-        goals = self._rewards[at] + self._discounts[at] * after
+        goals = rewards + discounts * after
         outputs = values_of(self.layers, states)
-        actions = self._actions[at][..., None]
+        actions = actions[..., None]
         error = np.take_along_axis(outputs[-1], actions, axis=2)[..., 0] - goals
         slope = np.zeros_like(outputs[-1])
-        np.put_along_axis(slope, actions, np.clip(error, -1, 1)[..., None] / shape[1], axis=2)
+        share = np.clip(error, -1, 1)[..., None] / self.config.batch
+        np.put_along_axis(slope, actions, share, axis=2)
         self._descend(gradients(self.layers, outputs, slope))
 
     def _descend(self, slopes: Layers) -> None:

@@ -1,10 +1,11 @@
-"""Train a neural network on the Gymnasium environment, and Sarsa with a CMAC beside it.
+"""Three learners side by side: Sarsa with a CMAC, a small network, and JAX's with Optax.
 
     .venv/bin/python src/keepaway_agent/examples/train_network.py --hours 10 --trials 5
 
 One page, after CleanRL's: settings, the loop, a figure. Field k is trial k: it has a network of
 its own, and plays what trial k of `scripts/train.py` plays with the same seed. All keepers of a
-trial share what they learn, with the network as with the CMAC.
+trial share what they learn, with the networks as with the CMAC. Choices take different numbers of
+cycles (a semi-Markov problem), so what comes after a choice counts `gamma ** cycles`.
 """
 
 import argparse
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from scipy import stats
 from small_network import QNetworks
 
 from keepaway_agent.environments.gym import KeeperVectorEnv
@@ -37,6 +39,7 @@ class Args:
     epsilon_from: float = 0.3  # share of random choices at first
     epsilon_to: float = 0.01  # and in the end
     epsilon_hours: float = 5.0  # simulated, from the one to the other
+    learners: str = "sarsa,numpy,jax"  # which of them
     out: str = "out/network"  # folder for the figure and the durations
 
 
@@ -44,16 +47,16 @@ Durations = list[np.ndarray]
 """For every trial the cycles of its episodes, in order."""
 
 
-def train_network(args: Args) -> Durations:
+def train_network(args: Args, kind: type[QNetworks] = QNetworks) -> Durations:
     """Learn by Q-learning with a network for every trial."""
     env = KeeperVectorEnv(args.trials, task=args.task)
     scale = env.single_observation_space.high
     rng = np.random.default_rng(args.seed)
-    networks = QNetworks(args.trials, len(scale), int(env.single_action_space.n), rng)
+    networks = kind(args.trials, len(scale), int(env.single_action_space.n), rng)
     durations: list[list[int]] = [[] for _ in range(args.trials)]
     played = np.zeros(args.trials)  # cycles of finished episodes
-    observations, _ = env.reset(seed=args.seed)
-    states, in_play = observations / scale, np.ones(args.trials, dtype=np.bool_)
+    observations, infos = env.reset(seed=args.seed)
+    states, chooses = observations / scale, infos["choosing"]
     while played.min() < args.hours * CYCLES_PER_HOUR:
         progress = min(1.0, played.min() / (args.epsilon_hours * CYCLES_PER_HOUR))
         epsilon = args.epsilon_from + progress * (args.epsilon_to - args.epsilon_from)
@@ -62,12 +65,19 @@ def train_network(args: Args) -> Durations:
         after = args.gamma ** infos["cycles"]
         paid = SECONDS_PER_CYCLE * (1 - after) / (1 - args.gamma)
         next_states = observations / scale
-        networks.learn(in_play, states, actions, paid, np.where(ended, 0.0, after), next_states)
-        states, in_play = next_states, ~ended
+        networks.learn(chooses, states, actions, paid, np.where(ended, 0.0, after), next_states)
+        states, chooses = next_states, infos["choosing"]
         for trial in np.flatnonzero(ended):
             durations[trial].append(int(infos["cycle"][trial]))
             played[trial] += infos["cycle"][trial]
     return [np.array(each) for each in durations]
+
+
+def train_jax(args: Args) -> Durations:
+    """Learn by Q-learning with JAX and Optax; an extra, see `jax_network.py`."""
+    from jax_network import JaxQNetworks
+
+    return train_network(args, JaxQNetworks)
 
 
 def train_sarsa(args: Args) -> Durations:
@@ -91,22 +101,31 @@ def curve(durations: Durations, hours: float, num_points: int = 20) -> np.ndarra
     return np.array(curves)
 
 
+def half_width(values: np.ndarray) -> np.ndarray:
+    """Half of a 95 % interval of the mean over the first axis (Student's t)."""
+    num_trials = len(values)
+    if num_trials < 2:
+        return np.zeros(values.shape[1:])
+    sem = values.std(axis=0, ddof=1) / np.sqrt(num_trials)
+    return np.asarray(stats.t.ppf(0.975, num_trials - 1) * sem)
+
+
 def draw(curves: dict[str, np.ndarray], args: Args, path: Path) -> None:
-    """Means of the trials with the standard errors of these means."""
+    """Means of the trials, with 95 % intervals of these means (Student's t)."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
     for name, values in curves.items():
-        num_trials, num_points = values.shape
+        num_points = values.shape[1]
         hours = (np.arange(num_points) + 0.5) * args.hours / num_points
-        mean, sem = values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(num_trials)
+        mean, half = values.mean(axis=0), half_width(values)
         (line,) = axes.plot(hours, mean, label=name)
-        axes.fill_between(hours, mean - sem, mean + sem, alpha=0.2, color=line.get_color())
+        axes.fill_between(hours, mean - half, mean + half, alpha=0.2, color=line.get_color())
     axes.set(
         xlabel="training time (simulated hours)",
         ylabel="episode duration (s)",
-        title=f"{args.task}, {args.trials} trials, seed {args.seed}; bands: standard error",
+        title=f"{args.task}, {args.trials} trials, seed {args.seed}; bands: 95 % intervals",
         ylim=(0, None),
     )
     axes.grid(alpha=0.3)
@@ -114,8 +133,15 @@ def draw(curves: dict[str, np.ndarray], args: Args, path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+LEARNERS = {
+    "sarsa": ("Sarsa, CMAC", train_sarsa),
+    "numpy": ("Q-learning, small network", train_network),
+    "jax": ("Q-learning, JAX and Optax", train_jax),
+}
+
+
 def main() -> None:
-    """Train both, draw both."""
+    """Train them, draw them."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     for field in fields(Args):
         name = "--" + field.name.replace("_", "-")
@@ -124,14 +150,15 @@ def main() -> None:
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
     curves = {}
-    for name, train in (("Sarsa, CMAC", train_sarsa), ("Q-learning, network", train_network)):
+    for each in args.learners.split(","):
+        name, train = LEARNERS[each]
         began = time.process_time()
         durations = train(args)
         curves[name] = curve(durations, args.hours)
         last = curves[name][:, -2:].mean(axis=1)
         print(
             f"{name}: {sum(map(len, durations)):,} episodes, at the end {last.mean():.2f} s"
-            f" +- {last.std(ddof=1) / np.sqrt(args.trials):.2f},"
+            f" +- {half_width(last):.2f},"
             f" {time.process_time() - began:.0f} s of CPU time"
         )
     np.save(out / "curves.npy", np.stack(list(curves.values())))

@@ -1,91 +1,228 @@
-"""PettingZoo: every keeper is an agent; the one that has a choice to make is selected."""
+"""PettingZoo, turn by turn: every player is an agent; the one that has a choice is selected."""
 
 from __future__ import annotations
 
+import copy
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
 from pettingzoo import AECEnv
+from pettingzoo.utils.env import AECIterable
 
-from keepaway_agent.environments.fields import Fields, observation_space
+from keepaway_agent.environments.one_field import OneField
+from keepaway_agent.environments.refusals import (
+    InvalidActionError,
+    ResetNeededError,
+    checked_action,
+    checked_limit,
+)
+from keepaway_agent.environments.snapshots import TurnState, require_kind
 
 
-class KeepersAECEnv(AECEnv[str, np.ndarray, int]):
-    """One field on which every keeper is an agent; the one that has a choice to make is selected.
+class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
+    """One field, turn by turn: who has a choice is selected, and time stands still meanwhile.
 
-    Every cycle pays 1 to each of them, so what `last` gives a keeper is the reward since its own
-    last choice: what a learner of Taylor & Stone (2005) is paid.
+    A keeper chooses between holding the ball (0) and passing to K(k+1) (k), when it can kick the
+    ball; a taker between going to the ball (0) and marking K(k+1) (k), every five cycles. All
+    choose on what they believe at the same moment, and then the field plays on to the next
+    choice. Every cycle pays 1 to each keeper and -1 to each taker, so what `last` gives an agent
+    is the reward since its own last choice: what a learner of Taylor & Stone (2005) is paid.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"name": "keepaway_v0", "render_modes": []}
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "keepaway_v0",
+        "render_modes": OneField.RENDER_MODES,
+        "render_fps": 10,
+        "is_parallelizable": False,
+    }
 
-    def __init__(self, **settings: Any) -> None:
-        """Lay out the field; `settings` are those of `Fields`."""
-        self._fields = Fields(**settings)
-        task = self._fields.task
-        self.render_mode = None
-        self.possible_agents = list(task.player_names[: task.num_keepers])
+    def __init__(
+        self,
+        teams: str = "keepers",
+        *,
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **settings: Any,
+    ) -> None:
+        """Lay out the field.
+
+        Args:
+            teams: who are agents: keepers, takers or both.
+            max_cycles: an episode is cut off (truncated) at the first choice after so many.
+            render_mode: None, rgb_array, rgb_array_list or human.
+            settings: those of `DecisionFields` but for the number of fields.
+
+        Raises:
+            AgentError, KeepawayError: settings with which nobody can play.
+        """
+        super().__init__()
+        self._max_cycles = checked_limit("max_cycles", max_cycles)
+        self._field = OneField(teams, render_mode, settings)
+        self.render_mode = self._field.render_mode
+        self.possible_agents = self._field.names[:]
         self.agents: list[str] = []
-        self.observation_spaces = {name: observation_space(task) for name in self.possible_agents}
-        self.action_spaces = {name: Discrete(task.num_keepers) for name in self.possible_agents}
-        self._is_started = False
+        self.observation_spaces = self._field.observation_spaces
+        num_actions = self._field.fields.task.num_keepers
+        self.action_spaces = {name: Discrete(num_actions) for name in self.possible_agents}
+        self.state_space = self._field.state_space
+        self._choices: dict[str, int] = {}
 
     def observation_space(self, agent: str) -> Box:
-        """Of this keeper's state variables."""
+        """Of an agent's state variables."""
+        self._field.role(agent)
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Discrete:
-        """Hold, or pass to K2, K3.."""
+        """Hold or pass to K2, K3..; go to the ball or mark K2, K3.."""
+        self._field.role(agent)
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Kick off, with the random numbers of `seed` or going on with those in use."""
-        if seed is None and self._is_started:
-            self._fields.abort()
-        else:
-            self._fields.start(0, np.random.SeedSequence(seed, spawn_key=(0,)))
-        self._is_started = True
-        while not self._fields.choosing.any():
-            self._play()
+        """Kick off, with the random numbers of `seed` or going on with those in use.
+
+        Raises:
+            InvalidSeedError, ClosedError: see `refusals`.
+        """
+        self._field.start(seed)
+        if not self._field.fields.choosing.any():
+            self._field.play_to_choice(until_the_end=False)
         self.agents = self.possible_agents[:]
         self.rewards = dict.fromkeys(self.agents, 0.0)
         self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
         self.terminations = dict.fromkeys(self.agents, False)
         self.truncations = dict.fromkeys(self.agents, False)
         self.infos: dict[str, dict[str, Any]] = {name: {} for name in self.agents}
+        self._choices = {}
+        self._tell_cycle()
         self._select()
 
     def observe(self, agent: str) -> np.ndarray:
-        """A keeper's state variables now, as if it had the ball."""
-        space = self.observation_space(agent)
-        state = np.zeros(space.shape)
-        self._fields.observe(0, self.possible_agents.index(agent), state)
-        return np.clip(state, space.low, space.high).astype(np.float32)
+        """An agent's state variables now, a keeper's as if it had the ball.
+
+        Raises:
+            AgentError, ResetNeededError, ClosedError: no such agent, or no episode.
+        """
+        self._field.fields.require_started()
+        return self._field.observe(agent)
+
+    def state(self) -> np.ndarray:
+        """The truth, which no player knows: see `spaces.state_space`.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._field.fields.require_started()
+        return self._field.state()
+
+    def last(self, observe: bool = True) -> Any:
+        """What the selected agent sees, its reward since its last choice, and how things are.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._require_agents()
+        return super().last(observe)
+
+    def agent_iter(self, max_iter: int = 2**63) -> AECIterable[str, np.ndarray, int]:
+        """The agents as they get to choose.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._field.fields.require_started()
+        return super().agent_iter(max_iter)
 
     def step(self, action: int | None) -> None:
-        """Make the selected keeper's choice; when all have chosen, play on to the next ones."""
+        """Make the selected agent's choice; when all have chosen, play on to the next ones.
+
+        Raises:
+            InvalidActionError, ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._require_agents()
         agent = self.agent_selection
-        if self.terminations[agent]:
+        if self.terminations[agent] or self.truncations[agent]:
+            if action is not None:
+                raise InvalidActionError(f"action={action!r}: {agent} has finished; give None")
             self._was_dead_step(action)
             return
-        keeper = self.possible_agents.index(agent)
-        assert action is not None
-        self._fields.choose(0, keeper, int(action))
-        self._fields.choosing[0, keeper] = False
+        self._choices[agent] = checked_action(action, int(self.action_spaces[agent].n), agent)
         self._cumulative_rewards[agent] = 0.0
-        cycles = 0
-        while not self._fields.choosing.any() and (cycles == 0 or not self._fields.is_over[0]):
-            self._play()
-            cycles += 1
-        self.rewards = dict.fromkeys(self.agents, float(cycles))
-        self.terminations = dict.fromkeys(self.agents, bool(self._fields.is_over[0]))
+        self.rewards = dict.fromkeys(self.agents, 0.0)
+        if not any(self._has_turn(name) for name in self.agents):
+            self._play_on()
         self._accumulate_rewards()
         self._select()
 
-    def _play(self) -> None:
-        self._fields.step(np.ones(1, dtype=np.bool_))
+    def get_state(self) -> TurnState:
+        """What there is of the field and of the turns now, as a copy: plain data.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        field = self._field.fields.get_state(0)
+        books = copy.deepcopy(self._books())
+        return TurnState(field, self.agents[:], self.agent_selection, dict(self._choices), books)
+
+    def set_state(self, state: TurnState, seed: int | None = None) -> None:
+        """Go on from a state; with random numbers from a seed, or those of the state.
+
+        Raises:
+            AgentError, KeepawayError, ClosedError: no such state, or one of another world.
+        """
+        self._field.set_state(require_kind(state, TurnState).field, seed)
+        self.agents, self.agent_selection = state.agents[:], state.selected
+        self._choices = dict(state.choices)
+        (
+            self.rewards,
+            self._cumulative_rewards,
+            self.terminations,
+            self.truncations,
+            self.infos,
+        ) = copy.deepcopy(state.books)
+
+    def _books(self) -> tuple[dict[str, Any], ...]:
+        sums = self._cumulative_rewards
+        return self.rewards, sums, self.terminations, self.truncations, self.infos
+
+    def render(self) -> Any:
+        """As the render mode says; None without one, and in a window.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._field.fields.require_started()
+        return self._field.camera.render()
+
+    def close(self) -> None:
+        """Play no more, and close the window."""
+        self._field.close()
+
+    def _play_on(self) -> None:
+        """Let all choices of a moment come into force, and play to the next ones."""
+        self._field.choose(self._choices)
+        self._choices = {}
+        cycles = self._field.play_to_choice(until_the_end=True)
+        self.rewards = {name: self._field.reward(name) * cycles for name in self.agents}
+        over = self._field.is_over
+        late = not over and self._field.cycle >= self._max_cycles
+        self.terminations = dict.fromkeys(self.agents, over)
+        self.truncations = dict.fromkeys(self.agents, late)
+        self._tell_cycle()
+
+    def _tell_cycle(self) -> None:
+        for name in self.agents:
+            self.infos[name] = {"cycle": self._field.cycle}
+
+    def _has_turn(self, name: str) -> bool:
+        return self._field.chooses(name) and name not in self._choices
 
     def _select(self) -> None:
-        """The first keeper in match order that has a choice; at the end, the first in the list."""
-        self.agent_selection = self.possible_agents[int(self._fields.choosing[0].argmax())]
+        """The first agent in match order that has a choice left; at the end, the first."""
+        waiting = (name for name in self.agents if self._has_turn(name))
+        self.agent_selection = next(waiting, self.agents[0])
+
+    def _require_agents(self) -> None:
+        self._field.fields.require_started()
+        if not self.agents:
+            raise ResetNeededError("the episode has ended: call reset first")

@@ -1,19 +1,34 @@
-"""Fields of a World on which keepers' choices are made from outside."""
+"""Fields of a World on which players' choices are made from outside."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
-from gymnasium.spaces import Box
 
-from keepaway_agent.actions import NO_TARGET, Action, Outcome, Role
+from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.compiled import Kernel
+from keepaway_agent.environments.compiled_fields import (
+    NO_CHOICE,
+    choose_all,
+    note_choices,
+    observe_keepers,
+    observe_takers,
+)
+from keepaway_agent.environments.refusals import (
+    MAX_FIELDS,
+    ClosedError,
+    ResetNeededError,
+    checked_number,
+)
+from keepaway_agent.environments.snapshots import FieldState, require_kind
+from keepaway_agent.environments.spaces import observation_space
+from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
-from keepaway_agent.learning.features import ORDERINGS, keeper_features, keeper_state, rank_players
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE
-from keepaway_agent.playing.policies import make_player
+from keepaway_agent.playing.policies import TAKER_DECISION_INTERVAL, make_player
 from keepaway_agent.training.deciding import Deciders, decide_all
 from keepaway_agent.training.trial import child_seed
 from keepaway_sim.task import Task
@@ -21,68 +36,105 @@ from keepaway_sim.world.config import Config
 from keepaway_sim.world.streams import RandomStreams
 from keepaway_sim.world.world import World
 
+OUTSIDE: Final = "outside"
+"""The policy of a team whose choices are made from outside."""
+RULES: Final = ("random", "hold", "hand")
+"""Policies of a team that plays by itself; takers cannot hold."""
+PATIENCE: Final = 100_000
+"""Cycles without a choice after which a world is given up: nobody in it gets anywhere."""
+_STUCK: Final = f"nobody has had a choice for {PATIENCE} cycles: check config"
+_STAND_INS: Final = {Role.KEEPER: "hold", Role.TAKER: "random"}
+"""What asks for a choice where a learner would; the choice from outside replaces its own."""
 
-class Fields:
-    """Fields of one World on which keepers' choices are made from outside.
+
+class DecisionFields:
+    """Fields of one World on which choices of one team, or of both, are made from outside.
 
     Attributes:
         task: what is played.
-        choosing: (num_fields, num_keepers) bool, who has a choice to make now.
-        cycle: (num_fields,) cycles since kick-off.
+        num_fields: side by side.
+        choosing: (num_fields, num_players) bool, who has a choice to make from outside now.
+        watchers: called after every kick-off and every cycle that was played.
     """
 
     def __init__(
         self,
-        task: str = "3v2",
+        task: str | Task = "3v2",
         num_fields: int = 1,
+        *,
+        keeper_policy: str = OUTSIDE,
         taker_policy: str = "hand",
         config: Config | None = None,
         ordering: str = "ball",
+        decision_interval: int = TAKER_DECISION_INTERVAL,
     ) -> None:
         """Lay out the fields.
 
         Args:
-            task: keepers v takers.
+            task: keepers v takers, on 25 m x 25 m; or a Task.
             num_fields: played side by side.
-            taker_policy: hand or random.
+            keeper_policy: outside, or who plays by itself: random, hold or hand.
+            taker_policy: outside, or random or hand.
             config: of the world.
-            ordering: what ranks players, ball or k1.
+            ordering: what ranks players in keepers' variables, ball or k1.
+            decision_interval: cycles between a taker's choices.
 
         Raises:
-            AgentError, KeepawayError: settings that make no match.
+            AgentError, KeepawayError: settings with which nobody can play.
         """
-        self.task = Task.parse(task)
-        self._world = World(self.task, config or Config(), num_fields)
-        n, num_players = self.task.num_keepers, self.task.num_players
-        shape = (num_fields, num_players)
-        self.choosing = np.zeros((num_fields, n), dtype=np.bool_)
-        self.cycle = self._world.belief.cycle
-        self._keeper = make_player(0, n, "hold", ordering)
-        self._taker = make_player(n, n, taker_policy)
+        self._settings = {name: value for name, value in locals().items() if name != "self"}
+        self.task = _checked_task(task)
+        self.num_fields = checked_number("num_fields", num_fields, 1, MAX_FIELDS)
+        interval = checked_number("decision_interval", decision_interval, 1, 1000)
+        n = self.task.num_keepers
+        self._outside = np.zeros(self.task.num_players, dtype=np.bool_)
+        self._outside[:n] = keeper_policy == OUTSIDE
+        self._outside[n:] = taker_policy == OUTSIDE
+        self._keeper = _rule_player(0, n, keeper_policy, ordering, interval)
+        self._taker = _rule_player(n, n, taker_policy, "ball", interval)
+        self._world = World(self.task, _checked_config(config), self.num_fields)
+        shape = (self.num_fields, self.task.num_players)
+        self.choosing = np.zeros(shape, dtype=np.bool_)
+        self._everywhere = np.ones(self.num_fields, dtype=np.bool_)
+        self._nowhere = np.zeros(self.num_fields, dtype=np.bool_)
+        self._moving = np.zeros(self.num_fields, dtype=np.bool_)
+        self._streams = RandomStreams(shape[0] * shape[1], UNIFORMS_PER_CHOICE, block=512)
+        self._deciders = self._make_deciders(shape)
+        self._decide_all = Kernel(decide_all, self._deciders)
+        self._choose_all = Kernel(choose_all, self._deciders)
+        self._note_choices = Kernel(note_choices, self._deciders)
+        self._observe = {
+            Role.KEEPER: Kernel(observe_keepers, self._deciders),
+            Role.TAKER: Kernel(observe_takers, self._deciders),
+        }
+        self._high = {role: observation_space(self.task, role).high for role in Role}
+        self._state = {role: np.zeros(len(self._high[role])) for role in Role}
+        self._is_started, self._is_closed = False, False
+        self.watchers: list[Callable[[DecisionFields], None]] = []
+
+    def _make_deciders(self, shape: tuple[int, int]) -> Deciders:
+        """The players; those from outside have a stand-in, and nobody learns."""
         policy = np.full(shape, self._keeper.policy)
-        policy[:, n:] = self._taker.policy
-        keepers, takers = (
-            sarsa.make_learners(
-                num_fields * size, n, make_tiling(role, n, self.task.num_takers), None
-            )
-            for role, size in ((Role.KEEPER, n), (Role.TAKER, self.task.num_takers))
-        )
-        self._ordering = ORDERINGS[ordering]
-        self._streams = RandomStreams(num_fields * num_players, UNIFORMS_PER_CHOICE, block=512)
-        self._deciders = Deciders(
+        policy[:, self.task.num_keepers :] = self._taker.policy
+        return Deciders(
             belief=self._world.belief,
-            keepers=keepers,
-            takers=takers,
+            keepers=self._make_learners(Role.KEEPER),
+            takers=self._make_learners(Role.TAKER),
             policy=policy,
             keeper=self._keeper,
             taker=self._taker,
             random=self._streams.draws,
-            order=np.zeros(num_players, dtype=np.int64),
+            order=np.zeros(shape[1], dtype=np.int64),
             action=np.zeros(shape, dtype=np.int64),
             target=np.zeros(shape, dtype=np.int64),
             chose=np.zeros(shape, dtype=np.bool_),
         )
-        self._decide_all = Kernel(decide_all, self._deciders)
+
+    def _make_learners(self, role: Role) -> sarsa.Learners:
+        n, m = self.task.num_keepers, self.task.num_takers
+        size = n if role == Role.KEEPER else m
+        count = self.num_fields * size  # of one table, which nobody reads or writes
+        return sarsa.make_learners(count, n, make_tiling(role, n, m), None, count)
 
     @property
     def is_over(self) -> np.ndarray:
@@ -90,55 +142,232 @@ class Fields:
         over: np.ndarray = self._world.belief.outcome != Outcome.IN_PLAY
         return over
 
+    @property
+    def outcome(self) -> np.ndarray:
+        """(num_fields,) int8, why the episode ended (`Outcome`)."""
+        return self._world.belief.outcome
+
+    @property
+    def cycle(self) -> np.ndarray:
+        """(num_fields,) cycles since kick-off."""
+        return self._world.belief.cycle
+
+    @property
+    def world(self) -> World:
+        """The world, to look at."""
+        return self._world
+
+    @property
+    def deciders(self) -> Deciders:
+        """The players, for compiled functions."""
+        return self._deciders
+
+    @property
+    def is_started(self) -> bool:
+        """Whether there was a first kick-off."""
+        return self._is_started
+
+    def require_open(self) -> None:
+        """Refuse whatever comes after `close`.
+
+        Raises:
+            ClosedError: these fields were closed.
+        """
+        if self._is_closed:
+            raise ClosedError("this environment was closed: make a new one")
+
+    def require_started(self) -> None:
+        """Refuse what makes no sense before the first kick-off.
+
+        Raises:
+            ResetNeededError, ClosedError: it is too early, or too late.
+        """
+        self.require_open()
+        if not self._is_started:
+            raise ResetNeededError("nothing is played yet: call reset first")
+
+    def close(self) -> None:
+        """Play no more."""
+        self._is_closed = True
+
     def start(self, field: int, seed: np.random.SeedSequence) -> None:
         """Begin anew on a field, with all random numbers from this seed."""
+        self.require_open()
+        self._seed_policies(field, seed)
+        self._world.start(field, child_seed(seed, 0))
+        self._is_started = True
+        self._look(np.arange(self.num_fields) == field, self._nowhere)
+
+    def _seed_policies(self, field: int, seed: np.random.SeedSequence) -> None:
         first = field * self.task.num_players
         for player in range(self.task.num_players):
             generator = np.random.default_rng(child_seed(seed, 1, player))
             self._streams.seed(first + player, generator)
-        self._world.start(field, child_seed(seed, 0))
-        self._look(np.arange(len(self.cycle)) == field)
 
-    def abort(self) -> None:
-        """End the episodes of all fields; the next cycle kicks off new ones."""
-        for field in np.flatnonzero(~self.is_over):
+    def abort(self, fields: np.ndarray) -> None:
+        """End the episodes of (num_fields,) bool `fields`; their next cycle kicks off new ones."""
+        for field in np.flatnonzero(fields & ~self.is_over):
             self._world.abort(int(field))
-        self.choosing[:] = False
+        self.choosing[fields] = False
 
-    def choose(self, field: int, keeper: int, choice: int) -> None:
-        """Make a keeper's choice: 0 to hold, k to pass to K(k+1)."""
-        action, target = Action.HOLD_BALL, NO_TARGET
-        if choice:
-            self._rank(field, keeper)
-            action, target = Action.PASS_BALL, int(self._deciders.order[choice])
-        self._deciders.action[field, keeper], self._deciders.target[field, keeper] = action, target
+    def choose(self, choices: np.ndarray) -> None:
+        """Make choices: (num_fields, num_players) int64, NO_CHOICE for who makes none.
 
-    def step(self, moving: np.ndarray) -> None:
-        """Play a cycle on the fields of (num_fields,) `moving`; time stands still on the others."""
-        self._world.step(self._deciders.action, self._deciders.target, moving)
-        self._look(moving)
+        A keeper's choice is 0 to hold the ball or k to pass to K(k+1); a taker's 0 to go to the
+        ball or k to mark K(k+1).
+        """
+        self._choose_all(choices)
+        self.choosing[choices != NO_CHOICE] = False
 
-    def observe(self, field: int, keeper: int, into: np.ndarray) -> None:
-        """Write a keeper's state variables, itself being K1, into (4n + 2m - 3,) `into`."""
-        self._rank(field, keeper)
-        position = self._world.belief.position[field, keeper]
-        keeper_state(position, self._deciders.order, self.task.num_keepers, into)
+    def step(self, moved: np.ndarray) -> None:
+        """Play a cycle on the fields of (num_fields,) `moved`; time stands still on the others."""
+        self._step(moved, self._nowhere)
 
-    def _rank(self, field: int, keeper: int) -> None:
-        position = self._world.belief.position[field, keeper]
-        num_keepers = self.task.num_keepers
-        rank_players(position, num_keepers, keeper, -1, self._ordering, self._deciders.order)
+    def _step(self, moved: np.ndarray, in_play: np.ndarray) -> tuple[int, int]:
+        """Play a cycle; results and `in_play` are those of `note_choices`."""
+        self._world.step(self._deciders.action, self._deciders.target, moved)
+        return self._look(moved, in_play)
 
-    def _look(self, moved: np.ndarray) -> None:
-        """Let every player answer by rule where time went by, and find out who has a choice."""
+    def play_on(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> None:
+        """Play every field of `moved` to its next choice.
+
+        Args:
+            moved: (num_fields,) bool.
+            in_play: (num_fields,) bool, fields on which the end of the episode stops as well;
+                the others kick off a new one first.
+            cycles: (num_fields,) int64, those that are played are added.
+
+        Raises:
+            AgentError: nobody gets a choice; the world's constants leave nobody a game.
+        """
+        left = int(moved.sum())
+        for _ in range(PATIENCE):
+            if not left:
+                return
+            cycles += moved
+            _, left = self._step(moved, in_play)
+            moved = self._moving.copy()
+        raise AgentError(_STUCK)
+
+    def play_until_any(self, in_play: np.ndarray, cycles: np.ndarray) -> None:
+        """Play all fields until there is a choice on one, or the end of an episode.
+
+        Arguments and errors are those of `play_on`.
+        """
+        for _ in range(PATIENCE):
+            cycles += 1
+            if self._step(self._everywhere, in_play)[0]:
+                return
+        raise AgentError(_STUCK)
+
+    def observe(self, role: Role, who: np.ndarray, into: np.ndarray) -> None:
+        """Write what one player of every field sees.
+
+        Args:
+            role: of these players.
+            who: (num_fields,) int64, in match order.
+            into: (num_fields, num_variables) float32, written.
+        """
+        self._observe[role](who, self._high[role], self._state[role], into)
+
+    def get_state(self, field: int) -> FieldState:
+        """All there is of a field now, random numbers included, as a copy.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self.require_started()
+        return self._state_of(field)
+
+    def _state_of(self, field: int) -> FieldState:
+        return FieldState(
+            world=self._world.snapshot(field),
+            streams=[self._streams.snapshot(stream) for stream in self._streams_of(field)],
+            takers=self._taker_rows(field).copy(),
+            requests=np.stack([self._deciders.action[field], self._deciders.target[field]]),
+            choosing=self.choosing[field].copy(),
+        )
+
+    def set_state(self, field: int, state: FieldState) -> None:
+        """Go on from a state, of this field or another of the same task and configuration.
+
+        Raises:
+            AgentError, KeepawayError, ClosedError: no such state, or one of another world.
+        """
+        self.require_open()
+        self._world.restore(field, require_kind(state, FieldState).world)
+        for stream, snapshot in zip(self._streams_of(field), state.streams, strict=True):
+            self._streams.restore(stream, snapshot)
+        takers, rows = self._deciders.takers, self._taker_slice(field)
+        takers.action[rows], takers.cycle[rows], takers.target[rows] = state.takers
+        self._deciders.action[field], self._deciders.target[field] = state.requests
+        self.choosing[field] = state.choosing
+        self._is_started = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Settings and states: machine code and discs are made anew where they arrive."""
+        fields = range(self.num_fields)
+        return {
+            "settings": self._settings,
+            "states": [self._state_of(field) for field in fields] if self._is_started else [],
+            "is_closed": self._is_closed,
+            "watchers": self.watchers,
+        }
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        """Lay the fields out again, and put them where they were."""
+        self.__init__(**kept["settings"])  # type: ignore[misc]
+        for field, state in enumerate(kept["states"]):
+            self.set_state(field, state)
+        self._is_closed, self.watchers = kept["is_closed"], kept["watchers"]
+
+    def _streams_of(self, field: int) -> range:
+        size = self.task.num_players
+        return range(field * size, (field + 1) * size)
+
+    def _taker_slice(self, field: int) -> slice:
+        size = self.task.num_takers
+        return slice(field * size, (field + 1) * size)
+
+    def _taker_rows(self, field: int) -> np.ndarray:
+        takers, rows = self._deciders.takers, self._taker_slice(field)
+        return np.stack([takers.action[rows], takers.cycle[rows], takers.target[rows]])
+
+    def _look(self, moved: np.ndarray, in_play: np.ndarray) -> tuple[int, int]:
+        """Let everybody answer by rule where time went by, and find out who has a choice."""
         self._streams.refill()
         self._decide_all(moved)
-        self.choosing[moved] = self._deciders.chose[moved, : self.task.num_keepers]
+        found: tuple[int, int] = self._note_choices(
+            self._outside, moved, in_play, self.choosing, self._moving
+        )
+        for watch in self.watchers:
+            watch(self)
+        return found
 
 
-def observation_space(task: Task) -> Box:
-    """Of a keeper's state variables: metres up to the field's diagonal, angles up to pi."""
-    diagonal = math.hypot(task.field_length, task.field_width)
-    features = keeper_features(task.num_keepers, task.num_takers)
-    high = [math.pi if feature.kind == "min_angle" else diagonal for feature in features]
-    return Box(np.zeros(len(high), np.float32), np.array(high, np.float32), dtype=np.float32)
+def _rule_player(index: int, num_keepers: int, policy: Any, ordering: Any, interval: int) -> Any:
+    """The Player that stands for a team; see `_STAND_INS`."""
+    role = Role.KEEPER if index < num_keepers else Role.TAKER
+    known = (OUTSIDE, *RULES) if role == Role.KEEPER else (OUTSIDE, "random", "hand")
+    if not isinstance(policy, str) or policy not in known:
+        raise AgentError(f"{role.name.lower()} policy {policy!r}: choose one of {', '.join(known)}")
+    if not isinstance(ordering, str):
+        raise AgentError(f"ordering {ordering!r}: choose ball or k1")
+    rule = _STAND_INS[role] if policy == OUTSIDE else policy
+    return make_player(index, num_keepers, rule, ordering, interval)
+
+
+def _checked_task(task: Any) -> Task:
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str):
+        raise AgentError(f"task={task!r}: write keepers v takers like '3v2', or give a Task")
+    return Task.parse(task)
+
+
+def _checked_config(config: Any) -> Config:
+    if config is None or isinstance(config, Config):
+        return config or Config()
+    raise AgentError(
+        f"config={config!r:.60}: give a keepaway_sim.world.config.Config, as `profile` makes"
+    )

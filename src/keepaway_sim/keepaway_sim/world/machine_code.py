@@ -29,6 +29,7 @@ SOURCES: Final = (
     "actions.py",
     "bags/chunk_records.py",
     "compiled.py",
+    "environments/compiled_fields.py",
     "learning",
     "machine_code.py",
     "playing",

@@ -1,0 +1,177 @@
+"""Measure cycles a CPU second of every environment class beside the trainer, in one run.
+
+    .venv/bin/python scripts/checks/environment_speed.py --write
+
+Keepers of 3v2 choose at random everywhere. All are measured in turns, again and again, so that a
+busy machine slows all of them alike; times are CPU times of this process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from keepaway_agent.environments import (
+    KeepawayAECEnv,
+    KeepawayParallelEnv,
+    KeeperEnv,
+    KeeperVectorEnv,
+)
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
+
+PAGE = Path(__file__).resolve().parents[2] / "src/keepaway_agent/docs/environments.md"
+BEGIN, END = "<!-- speed: begin -->", "<!-- speed: end -->"
+
+Play = Callable[[int], int]
+"""Plays at least so many cycles a field; how many they were, of all fields."""
+
+
+def trainer(num_fields: int) -> Play:
+    """The trainer's own loop, nobody learning."""
+    own, seeds = Trainer(TrainerConfig(), num_fields), iter(range(10**9))
+
+    def play(cycles: int) -> int:
+        rule, seed = StopRule(max_cycles=cycles), next(seeds)
+        trials = [Trial(trial_seed(seed, k), rule, "random") for k in range(num_fields)]
+        return sum(int(result.durations.sum()) for result in own.run(trials))
+
+    return play
+
+
+def vector(num_fields: int, wait_for: str) -> Play:
+    """Many fields of one World."""
+    env, rng = KeeperVectorEnv(num_fields, wait_for=wait_for), np.random.default_rng(0)
+    env.reset(seed=0)
+
+    def play(cycles: int) -> int:
+        played = 0
+        while played < cycles * num_fields:
+            _, _, ended, _, infos = env.step(rng.integers(3, size=num_fields))
+            played += int(infos["cycle"][ended].sum())
+        return played
+
+    return play
+
+
+def single() -> Play:
+    """One field, from choice to choice."""
+    env, rng = KeeperEnv(), np.random.default_rng(0)
+
+    def play(cycles: int) -> int:
+        played = 0
+        while played < cycles:
+            over, info = not env.reset(seed=played)[1], dict[str, Any]()
+            while not over:
+                _, _, over, _, info = env.step(int(rng.integers(3)))
+            played += info["cycle"]
+        return played
+
+    return play
+
+
+def turns(teams: str) -> Play:
+    """One field, turn by turn."""
+    env, rng = KeepawayAECEnv(teams), np.random.default_rng(0)
+
+    def play(cycles: int) -> int:
+        played = 0
+        while played < cycles:
+            env.reset(seed=played)
+            cycle = 0
+            for _ in env.agent_iter():
+                over, info = env.last()[2], env.last()[4]
+                env.step(None if over else int(rng.integers(3)))
+                cycle = info["cycle"]
+            played += cycle
+        return played
+
+    return play
+
+
+def parallel() -> Play:
+    """One field, cycle by cycle."""
+    env, rng = KeepawayParallelEnv(), np.random.default_rng(0)
+
+    def play(cycles: int) -> int:
+        played = 0
+        while played < cycles:
+            env.reset(seed=played)
+            while env.agents:
+                env.step({name: int(rng.integers(3)) for name in env.agents})
+                played += 1
+        return played
+
+    return play
+
+
+GROUPS: dict[str, dict[str, Callable[[], Play]]] = {
+    "128 fields": {
+        "trainer": lambda: trainer(128),
+        '`KeeperVectorEnv`, `wait_for="any"`': lambda: vector(128, "any"),
+        "`KeeperVectorEnv`": lambda: vector(128, "all"),
+    },
+    "16 fields": {
+        "trainer": lambda: trainer(16),
+        '`KeeperVectorEnv`, `wait_for="any"`': lambda: vector(16, "any"),
+        "`KeeperVectorEnv`": lambda: vector(16, "all"),
+    },
+    "1 field": {
+        "trainer": lambda: trainer(1),
+        "`KeeperEnv`": single,
+        "`KeepawayAECEnv`": lambda: turns("keepers"),
+        "`KeepawayAECEnv`, both teams": lambda: turns("both"),
+        "`KeepawayParallelEnv`": parallel,
+    },
+}
+
+
+def measure(group: dict[str, Callable[[], Play]], cycles: int, rounds: int) -> dict[str, float]:
+    """Cycles a CPU second of each, the first first; warmed up before."""
+    plays = {name: make() for name, make in group.items()}
+    spent, played = dict.fromkeys(plays, 0.0), dict.fromkeys(plays, 0)
+    for count in range(rounds + 1):
+        for name, play in plays.items():
+            began = time.process_time()
+            done = play(cycles)
+            if count:
+                spent[name] += time.process_time() - began
+                played[name] += done
+    return {name: played[name] / spent[name] for name in plays}
+
+
+def table(cycles: int, rounds: int) -> str:
+    """All of them, as rows of Markdown."""
+    rows = ["| | cycles a CPU second | of the trainer's |", "|---|---|---|"]
+    for fields, group in GROUPS.items():
+        speeds = measure(group, cycles, rounds)
+        for name, speed in speeds.items():
+            share = f"{speed / speeds['trainer']:.2f}"
+            rows.append(f"| {fields}, {name} | {speed:,.0f} | {share} |")
+    return "\n".join(rows)
+
+
+def main() -> int:
+    """Print the table, or write it into the page."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--cycles", type=int, default=500, help="a field and turn (default 500)")
+    parser.add_argument("--rounds", type=int, default=5, help="turns of each (default 5)")
+    parser.add_argument("--write", action="store_true", help=f"write it into {PAGE.name}")
+    args = parser.parse_args()
+    rows = table(args.cycles, args.rounds)
+    print(rows)
+    if args.write:
+        text = PAGE.read_text()
+        before, after = text.partition(BEGIN)[0], text.partition(END)[2]
+        PAGE.write_text(f"{before}{BEGIN}\n{rows}\n{END}{after}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
