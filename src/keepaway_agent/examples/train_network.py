@@ -149,19 +149,19 @@ def main() -> None:
     args = Args(**vars(parser.parse_args()))
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
-    curves = {}
     for each in args.learners.split(","):
         name, train = LEARNERS[each]
         began = time.process_time()
         durations = train(args)
-        curves[name] = curve(durations, args.hours)
-        last = curves[name][:, -2:].mean(axis=1)
+        values = curve(durations, args.hours)
+        last = values[:, -2:].mean(axis=1)
         print(
             f"{name}: {sum(map(len, durations)):,} episodes, at the end {last.mean():.2f} s"
-            f" +- {half_width(last):.2f},"
-            f" {time.process_time() - began:.0f} s of CPU time"
+            f" +- {half_width(last):.2f}, {time.process_time() - began:.0f} s of CPU time"
         )
-    np.save(out / "curves.npy", np.stack(list(curves.values())))
+        np.save(out / f"{each}.npy", values)
+    kept = {each: out / f"{each}.npy" for each in LEARNERS}  # of this run, or of earlier ones
+    curves = {LEARNERS[each][0]: np.load(path) for each, path in kept.items() if path.exists()}
     draw(curves, args, out / "learning_curves.png")
     print(f"drew {out / 'learning_curves.png'}")
 

@@ -1,0 +1,80 @@
+"""Takers are agents as keepers are: they play as the trainer's, on any task, for their own pay."""
+
+import numpy as np
+import pytest
+
+from keepaway_agent.actions import Role
+from keepaway_agent.environments import KeepawayAECEnv, KeepawayParallelEnv
+from keepaway_agent.learning.features import feature_names
+from keepaway_agent.training.trainer import Trainer
+from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
+from keepaway_sim.task import Task
+
+
+def always(choice: int, config: TrainerConfig) -> np.ndarray:
+    """Weights of takers who value one choice most whatever they see."""
+    tiling = config.tiling(Role.TAKER)
+    weights = np.zeros((config.task.num_keepers, tiling.num_features, tiling.num_tiles, 32))
+    weights[choice] = 1.0
+    return weights
+
+
+def durations_of_trainer(choice: int, task: str) -> list[int]:
+    config = TrainerConfig(Task.parse(task))
+    weights = always(choice, config)
+    trial = Trial(trial_seed(6, 0), StopRule(max_episodes=3), "hold", "greedy", None, weights)
+    (result,) = Trainer(config, num_fields=1).run([trial])
+    return result.durations.tolist()
+
+
+def durations_of_turns(choice: int, task: str, teams: str) -> list[int]:
+    settings = {"keeper_policy": "hold"} if teams == "takers" else {}
+    env, durations = KeepawayAECEnv(teams, task=task, **settings), []
+    env.reset(seed=6)
+    for _ in range(3):
+        cycle = 0
+        for agent in env.agent_iter():
+            _, _, over, _, info = env.last()
+            env.step(None if over else choice * agent.startswith("taker"))
+            cycle = info["cycle"]
+        durations.append(cycle)
+        env.reset()
+    return durations
+
+
+@pytest.mark.parametrize("teams", ["takers", "both"])
+@pytest.mark.parametrize(("choice", "task"), [(0, "3v2"), (2, "4v3")])
+def test_takers_from_outside_play_as_the_trainers(choice: int, task: str, teams: str) -> None:
+    assert durations_of_turns(choice, task, teams) == durations_of_trainer(choice, task)
+
+
+@pytest.mark.parametrize("task", ["2v1", "6v5", "11v10"])
+def test_any_number_of_players_plays(task: str) -> None:
+    env = KeepawayParallelEnv(task=task, max_cycles=40)
+    sizes = Task.parse(task)
+    seen, _ = env.reset(seed=3)
+    assert len(env.agents) == sizes.num_players
+    rng, choices = np.random.default_rng(0), dict.fromkeys(env.agents, 0)
+    while env.agents:
+        masks = {name: each["action_mask"] for name, each in seen.items()}
+        actions = {name: int(rng.choice(np.flatnonzero(mask))) for name, mask in masks.items()}
+        for name, mask in masks.items():
+            choices[name] += int(mask[0])
+        seen, rewards, *_ = env.step(actions)
+        assert {name: reward > 0 for name, reward in rewards.items()} == {
+            name: name.startswith("keeper") for name in rewards
+        }
+    names = feature_names(Role.TAKER, sizes.num_keepers, sizes.num_takers)
+    assert seen["taker_1"]["observation"].shape == (len(names),)
+    assert all(choices[f"taker_{k + 1}"] >= 3 for k in range(sizes.num_takers))
+
+
+def test_a_takers_mask_opens_every_five_cycles() -> None:
+    env = KeepawayParallelEnv("takers", keeper_policy="hold")
+    seen, _ = env.reset(seed=1)
+    opened = []
+    for cycle in range(21):
+        if seen["taker_1"]["action_mask"][0]:
+            opened.append(cycle)
+        seen, *_ = env.step(dict.fromkeys(env.agents, 0))
+    assert opened == [0, 5, 10, 15, 20]
