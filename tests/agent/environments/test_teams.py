@@ -19,17 +19,19 @@ def always(choice: int, config: TrainerConfig) -> np.ndarray:
     return weights
 
 
-def durations_of_trainer(choice: int, task: str) -> list[int]:
+def durations_of_trainer(choice: int, task: str, keepers: str) -> list[int]:
     config = TrainerConfig(Task.parse(task))
     weights = always(choice, config)
-    trial = Trial(trial_seed(6, 0), StopRule(max_episodes=3), "hold", "greedy", None, weights)
+    trial = Trial(trial_seed(6, 0), StopRule(max_episodes=3), keepers, "greedy", None, weights)
     (result,) = Trainer(config, num_fields=1).run([trial])
-    return result.durations.tolist()
+    durations: list[int] = result.durations.tolist()
+    return durations
 
 
-def durations_of_turns(choice: int, task: str, teams: str) -> list[int]:
-    settings = {"keeper_policy": "hold"} if teams == "takers" else {}
-    env, durations = KeepawayAECEnv(teams, task=task, **settings), []
+def durations_of_turns(choice: int, task: str, keepers: str) -> list[int]:
+    """Keepers from outside hold the ball."""
+    teams = "both" if keepers == "outside" else "takers"
+    env, durations = KeepawayAECEnv(teams, task=task, keeper_policy=keepers), list[int]()
     env.reset(seed=6)
     for _ in range(3):
         cycle = 0
@@ -42,10 +44,14 @@ def durations_of_turns(choice: int, task: str, teams: str) -> list[int]:
     return durations
 
 
-@pytest.mark.parametrize("teams", ["takers", "both"])
-@pytest.mark.parametrize(("choice", "task"), [(0, "3v2"), (2, "4v3")])
-def test_takers_from_outside_play_as_the_trainers(choice: int, task: str, teams: str) -> None:
-    assert durations_of_turns(choice, task, teams) == durations_of_trainer(choice, task)
+@pytest.mark.parametrize(
+    ("choice", "task", "keepers"),
+    [(0, "3v2", "hold"), (0, "4v3", "outside"), (2, "4v3", "random")],
+)
+def test_takers_from_outside_play_as_the_trainers(choice: int, task: str, keepers: str) -> None:
+    theirs = "hold" if keepers == "outside" else keepers
+    wanted = durations_of_trainer(choice, task, theirs)
+    assert durations_of_turns(choice, task, keepers) == wanted
 
 
 @pytest.mark.parametrize("task", ["2v1", "6v5", "11v10"])

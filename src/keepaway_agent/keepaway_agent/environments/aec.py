@@ -54,7 +54,7 @@ class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
             settings: those of `DecisionFields` but for the number of fields.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         super().__init__()
         self._max_cycles = checked_limit("max_cycles", max_cycles)

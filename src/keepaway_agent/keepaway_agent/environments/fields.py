@@ -80,7 +80,7 @@ class DecisionFields:
             decision_interval: cycles between a taker's choices.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         self._settings = {name: value for name, value in locals().items() if name != "self"}
         self.task = _checked_task(task)

@@ -87,7 +87,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             settings: task, taker_policy, config, ordering: see `DecisionFields`.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         refuse_unknown(settings)
         self.num_envs = checked_number("num_envs", num_envs, 1, MAX_FIELDS)
@@ -299,7 +299,7 @@ class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
             settings: task, taker_policy, config, ordering: see `DecisionFields`.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         refuse_unknown(settings)
         self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])

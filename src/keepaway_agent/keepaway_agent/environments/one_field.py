@@ -43,7 +43,7 @@ class OneField:
             settings: those of `DecisionFields` but for the number of fields.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         if not isinstance(teams, str) or teams not in TEAMS:
             raise AgentError(f"teams={teams!r}: choose one of {', '.join(TEAMS)}")

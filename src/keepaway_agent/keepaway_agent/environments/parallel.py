@@ -58,7 +58,7 @@ class KeepawayParallelEnv(ParallelEnv[str, Observation, int]):
             settings: those of `DecisionFields` but for the number of fields.
 
         Raises:
-            AgentError, KeepawayError: settings with which nobody can play.
+            AgentError, KeepawayError: settings that make no match.
         """
         self.max_cycles = checked_limit("max_cycles", max_cycles)
         self._field = OneField(teams, render_mode, settings)
