@@ -10,6 +10,7 @@ TWINS = {
     "settings.py": "settings.py",
     "ros/parameters.py": "nodes/parameters.py",
     "ros/running.py": "nodes/running.py",
+    "world/machine_code.py": "machine_code.py",
 }
 
 

@@ -15,25 +15,19 @@ from typing import Any
 import attrs
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
 from keepaway_agent.nodes.parameters import declare_settings
+from keepaway_agent.nodes.qos import ANSWERS, MATCHES_KEPT, PERCEPTIONS, STATUSES
 from keepaway_agent.nodes.running import run_node
 from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, WeightsFiles, check_config
 from keepaway_agent.settings import setting
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 
-QUEUE = QoSProfile(depth=10)
-ANSWERS = QoSProfile(depth=200)
-"""Deeper than the simulator needs: a recorder may be some cycles behind."""
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-MATCHES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""With a depth of 1 another simulator's `match` would replace the own one's."""
 ANNOUNCEMENT_PERIOD = (
     0.5  # [s] a first message may be lost although the nodes have found each other
 )
@@ -83,10 +77,10 @@ class PlayerNode(Node):
         self._start_weights = self._weights_to_start_from(files)
         name = self.get_name()
         self._requests = self.create_publisher(ActionRequest, f"{name}/action_request", ANSWERS)
-        self._status = self.create_publisher(AgentStatus, f"{name}/status", LATCHED)
-        self.create_subscription(Match, "match", self._on_match, MATCHES)
+        self._status = self.create_publisher(AgentStatus, f"{name}/status", STATUSES)
+        self.create_subscription(Match, "match", self._on_match, MATCHES_KEPT)
         self.create_subscription(
-            Perception, f"{name}/perception", self._on_perception, QUEUE, raw=True
+            Perception, f"{name}/perception", self._on_perception, PERCEPTIONS, raw=True
         )
         self.create_service(SaveWeights, f"{name}/save_weights", self._on_save)
         self.create_service(LoadWeights, f"{name}/load_weights", self._on_load)

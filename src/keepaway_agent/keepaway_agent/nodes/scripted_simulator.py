@@ -9,16 +9,14 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 
 from keepaway_agent.checks import conformance
 from keepaway_agent.checks.conformance import Exchange, Garbage, Pause, Request, Shown, Step
+from keepaway_agent.nodes.qos import ANSWERS, STATUSES
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 
-QUEUE = QoSProfile(depth=200)
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again, as the simulator does
 SILENCE = 0.02  # [s] to listen where no answer is due
 READY_PATIENCE = 300.0  # [s] for an agent to start, some of which compile
@@ -39,13 +37,13 @@ class ScriptedSimulator(Node):
         super().__init__("simulator", **node_options)
         self.log: list[Exchange] = []
         self._name, self._ready_as, self._said_at = name, -1, 0.0
-        self._match = self.create_publisher(Match, "match", LATCHED)
-        self._simulated_time = self.create_publisher(Clock, "/clock", QUEUE)
-        self._perception = self.create_publisher(Perception, f"{name}/perception", QUEUE)
+        self._match = self.create_publisher(Match, "match", STATUSES)
+        self._simulated_time = self.create_publisher(Clock, "/clock", ANSWERS)
+        self._perception = self.create_publisher(Perception, f"{name}/perception", ANSWERS)
         self.create_subscription(
-            ActionRequest, f"{name}/action_request", self._on_request, QUEUE, raw=True
+            ActionRequest, f"{name}/action_request", self._on_request, ANSWERS, raw=True
         )
-        self.create_subscription(AgentStatus, f"{name}/status", self._on_status, LATCHED)
+        self.create_subscription(AgentStatus, f"{name}/status", self._on_status, STATUSES)
 
     def perform(
         self, steps: Iterable[Step], spin: Spin, is_there: Callable[[], bool], patience: float
