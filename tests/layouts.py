@@ -116,7 +116,7 @@ def old_definition(messages: Many) -> Many:
     def older(definition: bytes) -> bytes:
         head, *inside = definition.decode().split("=" * 80, 1)
         lines = [line for line in head.splitlines() if line.split("#")[0].strip()]
-        known = itertools.takewhile(lambda line: " cycles_to_ball" not in line, lines)
+        known = itertools.takewhile(lambda line: "[] cycles_to_ball" not in line, lines)
         return "\n".join([*known, *("=" * 80 + part for part in inside)]).encode()
 
     return [

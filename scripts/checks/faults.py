@@ -3,7 +3,8 @@
     .venv/bin/python scripts/faults.py --faults 300
 
 Every process of a recorded, learning match may be hit: SIGKILL ends it, SIGSTOP freezes it for a
-while. `match.py --restart` starts again what was killed. What must hold all the time:
+while. `match.py --restart` starts again what was killed. A second simulator (by force) and a node
+that publishes episodes of no match are there all the while. What must hold all the time:
 
 - episodes are counted without a gap, and none twice;
 - every weights file can be read, and never knows fewer episodes than before;
@@ -61,6 +62,7 @@ class Witness(Node):
 
     def __init__(self) -> None:
         super().__init__("witness")
+        self.match_id = 0
         self.numbers: list[int] = []
         self.missing: Counter[str] = Counter()
         self.absent: set[str] | None = None
@@ -68,9 +70,13 @@ class Witness(Node):
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QUEUE)
 
     def _on_episode(self, message: Episode) -> None:
-        self.numbers.append(message.number)
+        self.match_id = self.match_id or message.match_id
+        if message.match_id == self.match_id:
+            self.numbers.append(message.number)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        if message.status[0].hardware_id != str(self.match_id):
+            return
         absent = {s.name for s in message.status if s.level == DiagnosticStatus.ERROR}
         self.missing.update(absent - (self.absent or set()))
         self.absent = absent
@@ -161,6 +167,35 @@ class Match:
         self._process.wait()
 
 
+class Intruders:
+    """A second simulator, started by force, and a node that publishes episodes of no match."""
+
+    def __init__(self, node: Node, folder: Path) -> None:
+        """Start the simulator; its words go into a file in the folder."""
+        self._episodes = node.create_publisher(Episode, "episode", ALL)
+        forced = ["--ros-args", "-p", "force:=true", "-p", "seed:=99"]
+        self._process = subprocess.Popen(
+            [sys.executable, str(SCRIPTS / "simulator.py"), *forced],
+            stdout=subprocess.DEVNULL,
+            stderr=(folder / "intruder.txt").open("wb"),
+        )
+
+    def disturb(self, number: int) -> None:
+        """Publish an episode that nobody played."""
+        self._episodes.publish(Episode(number=number, cycles=10_000, duration=1000.0))
+
+    def end(self) -> None:
+        """End the simulator.
+
+        Raises:
+            LossError: it was not there to the end.
+        """
+        if self._process.poll() is not None:
+            raise LossError(f"the second simulator ended with code {self._process.returncode}")
+        self._process.kill()
+        self._process.wait()
+
+
 def main() -> int:
     """Play, inject faults, check, report."""
     args = parse()
@@ -190,8 +225,9 @@ def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[
     executor.add_node(witness)
     faults: Counter[str] = Counter()
     wait_for_episodes(executor, witness, 1)
-    started = time.monotonic()
+    started, intruders = time.monotonic(), Intruders(witness, folder)
     for number in range(args.faults):
+        intruders.disturb(number)
         listen(executor, float(random.exponential(args.period)))
         fault = inject_fault(match, random, executor, args)
         faults[fault] += 1
@@ -204,6 +240,7 @@ def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[
     wait_for_everybody(executor, witness)
     wait_for_episodes(executor, witness, 3)
     summary = match.end()
+    intruders.end()
     listen(executor, 0.5)
     check_numbers(witness.numbers)
     match.check_weights()
@@ -212,6 +249,7 @@ def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[
         raise LossError(f"{len(witness.numbers)} episodes received, {summary['episodes']} reported")
     return {
         "faults": dict(sorted(faults.items())),
+        "intruders": ["a second simulator", f"{args.faults} stray episodes"],
         "seconds": round(time.monotonic() - started),
         "episodes": len(witness.numbers),
         "declared_missing": dict(sorted(witness.missing.items())),

@@ -15,7 +15,7 @@ setup(
     package_data={name: ["**/*.json", "**/*.toml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
-        (f"share/{name}", ["package.xml"]),
+        (f"share/{name}", ["package.xml", "LICENSE", "requirements.txt"]),
     ],
     entry_points={
         "console_scripts": [

@@ -15,7 +15,7 @@ setup(
     package_data={name: ["**/*.json", "**/*.toml", "view/web/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
-        (f"share/{name}", ["package.xml", "fastdds.xml"]),
+        (f"share/{name}", ["package.xml", "LICENSE", "requirements.txt", "fastdds.xml"]),
         (f"share/{name}/foxglove", ["foxglove/keepaway.json"]),
         (f"share/{name}/rviz", ["rviz/keepaway.rviz"]),
     ],

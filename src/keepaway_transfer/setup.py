@@ -15,7 +15,7 @@ setup(
     package_data={name: ["**/*.json", "**/*.toml", "**/*.npz"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
-        (f"share/{name}", ["package.xml"]),
+        (f"share/{name}", ["package.xml", "LICENSE", "requirements.txt"]),
         (f"share/{name}/launch", ["launch/match.launch.py"]),
     ],
     entry_points={
