@@ -89,6 +89,12 @@ def test_a_way_that_never_hurts_is_told_from_one_that_does(studies):
     assert "| yes | yes | after 1000: 4.00 [" in lines["`table2_at_5`"]
 
 
+def test_the_page_says_what_the_best_row_adds_to_the_best_optimistic_start(studies):
+    text = page(studies)
+    assert "with the least hours in all is 1000: against" in text
+    assert "start it saves 0.00 [-3.05, 3.05] h in all" in text
+
+
 def test_what_the_way_of_carrying_alone_saves_after_too_much_training_is_told(studies):
     hours = {"rho": 45.0, "rescaled": 20.0}
     studies["variants_6000"] = study_of(
