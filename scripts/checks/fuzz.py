@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from bag_structures import structure_reader
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from mutations import broken
 
@@ -57,7 +58,7 @@ from keepaway_transfer.studies.study import FOLDER as STUDIES
 from keepaway_transfer.studies.study import load_study
 
 CASE = Path("fuzz_case.bin")  # where a case that fails is left
-LONGEST = 10.0  # [s] of CPU time that a case may take
+LONGEST = 5.0  # [s] of CPU time that a case may take
 MOST_MEMORY = 2**30  # [bytes] that all cases may take beyond what the program has
 
 
@@ -154,6 +155,11 @@ def make_targets(folder: Path) -> dict[str, Target]:
     return {
         "weights file": Target(read_weights_file, weights_files(), (WeightsError,)),
         "bag": Target(bag_reader(folder / "case.mcap"), bags(folder), (KeepawayError,)),
+        "bag's structure": Target(
+            structure_reader(next((folder / "zstd").glob("*.mcap")), folder / "structures"),
+            [bytes(8)],
+            (KeepawayError,),
+        ),
         **text_targets(folder),
         "request": Target(request_taker(world), requests(), (KeepawayError,)),
         "status": Target(
