@@ -173,7 +173,9 @@ def training(*arguments: object) -> list[str]:
 
 def environment(**changes: str) -> dict[str, str]:
     """This process's environment with changes, in a domain of its own."""
-    return {**os.environ, "ROS_DOMAIN_ID": "21", **changes}
+    own = ("AMENT_PREFIX_PATH", "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_HOME")  # of this checkout
+    kept = {name: value for name, value in os.environ.items() if name not in own}
+    return {**kept, "ROS_DOMAIN_ID": "21", **changes}
 
 
 def run(
