@@ -94,7 +94,9 @@ class Scoreboard(Node):
         now = time.monotonic()
         if now < self._show_at or not self.episodes:
             return
-        bar = self._bar = self._bar or self._opened_bar()
+        if self._bar is None:  # a bar without a total has no truth value
+            self._bar = self._opened_bar()
+        bar = self._bar
         bar.set_postfix_str(self._words(), refresh=False)
         bar.update(len(self.episodes) - bar.n)
         if bar.disable:  # the output is no terminal
