@@ -212,3 +212,43 @@ def test_nothing_is_compiled_past_the_scheme() -> None:
     users = {module for module in MODULES if any("numba" in name for name in imports(module))}
     assert {module.name for module in users} == set(MECHANISM)
     assert importlib.util.find_spec("numba")
+
+
+HALF = """
+from keepaway_agent.compiled import compiled
+
+@compiled
+def half(x):
+    return x / 2
+"""
+KINDS = """
+from keepaway_agent.compiled import Kernel
+from keepaway_agent.learning.half import half
+kernel = Kernel(half)
+kernel.compile_for(1)
+print(kernel(3), kernel(3.5))
+"""
+
+
+@pytest.mark.parametrize(
+    ("variable", "expected"),
+    [
+        ("KEEPAWAY_CHECKED", "1.5 1.75"),
+        ("NUMBA_DISABLE_JIT", "1.5 1.75"),
+        ("UNUSED", "1.5 1.5"),  # taken for the whole number that it was compiled for
+    ],
+)
+def test_calls_may_be_checked_or_not_compiled(
+    checkout: Checkout, variable: str, expected: str
+) -> None:
+    checkout.write("keepaway_agent/learning/half.py", HALF)
+    command = [sys.executable, "-c", KINDS]
+    done = subprocess.run(
+        command,
+        env=checkout.env | {variable: "1"},
+        cwd="/",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == expected
