@@ -119,7 +119,7 @@ def odd_order(messages: list[Said], case: random.Random) -> list[Said]:
     if kind == 3:
         time = case.choice([0, 7, 2**62, 2**63, 2**64 - 1])
         return [m._replace(time=time) for m in messages]
-    return [m._replace(time=m.time + 1_750_000_000_000_000_000) for m in messages]
+    return [m._replace(time=(m.time + 1_750_000_000_000_000_000) % 2**64) for m in messages]
 
 
 CHANGES: tuple[Callable[[list[Said], random.Random], list[Said]], ...] = (

@@ -1,7 +1,7 @@
 """Chunks of an MCAP file: where they are, their bytes, and the records in them.
 
 All messages of a chunk are indexed at once by compiled code: the `mcap` library makes a Python
-object of each message, which takes 6 times as long (docs/recordings.md has the figures).
+object of each message.
 """
 
 from __future__ import annotations
