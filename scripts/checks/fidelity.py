@@ -4,9 +4,14 @@
     .venv/bin/python scripts/checks/fidelity.py --out src/keepaway_sim/docs
     .venv/bin/python scripts/checks/fidelity.py --episodes 500 --only 3v2 2005 hand
     .venv/bin/python scripts/checks/fidelity.py --learning --out out/fidelity
+    .venv/bin/python scripts/checks/fidelity.py --page src/keepaway_sim/docs
+    .venv/bin/python scripts/checks/fidelity.py --learned --seeds 12 --page src/keepaway_sim/docs
 
 Prints tables in Markdown: hold times, why they are what they are, and with --learning how 3v2
 keepers learn from scratch. Pictures go to --out. With --json it prints one JSON object instead.
+With --page the numbers are kept in a folder of documentation, and its page is written from all that
+are kept there. --learned measures what 3v2 keepers do and believe early, in the middle and late
+(20 simulated hours a trial).
 """
 
 import argparse
@@ -23,11 +28,14 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from keepaway_agent.fidelity import measure, reference
+from keepaway_agent.fidelity import learned, measure, reference
 from keepaway_agent.fidelity.figures import draw_durations, draw_learning
 from keepaway_agent.fidelity.measure import Measured
+from keepaway_agent.fidelity.page import page
 from keepaway_agent.fidelity.reference import Cell
+from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.describe import save
+from keepaway_agent.training.training import Training
 from keepaway_sim.version import code_version
 
 LEARNING_EPISODES = 3000
@@ -37,9 +45,12 @@ def main() -> int:
     """Play, print, draw."""
     arguments = parse()
     cells = [cell for cell in reference.reference_cells() if chosen(cell, arguments.only)]
-    if not cells:
+    if not cells and not arguments.learned:
         print(f"fidelity: no cell is called {' '.join(arguments.only)}", file=sys.stderr)
         return 1
+    if arguments.learned:
+        part = {"learned": learned_numbers(arguments.seeds, arguments.only == ["short"])}
+        return write_page(arguments.page, part) if arguments.page else say(part)
     if arguments.learning:
         profiles = [name for name in reference.PROFILES if any(c.profile == name for c in cells)]
         curves = learn(profiles, arguments.seeds, arguments.workers)
@@ -51,6 +62,9 @@ def main() -> int:
         text, numbers = report(measured, dict(zip(recorded, processes, strict=True)))
         figure, name = draw_durations(measured), "fidelity.png"
     command = shlex.join(["scripts/checks/fidelity.py", *sys.argv[1:]])
+    if arguments.page:
+        save(figure, arguments.page / name, f"{command}, version {code_version()}")
+        return write_page(arguments.page, numbers)
     if arguments.json:
         print(
             json.dumps(
@@ -62,6 +76,46 @@ def main() -> int:
     if arguments.out:
         save(figure, arguments.out / name, f"{command}, version {code_version()}")
         print(f"drawn: {arguments.out / name}", file=sys.stderr)
+    return 0
+
+
+def learned_numbers(trials: int, short: bool) -> dict[str, Any]:
+    """Curves, behaviour and beliefs of 3v2 keepers that learn as the reference's do."""
+    total, begins = (400, (0, 200)) if short else (5400, (0, 2800, 5200))
+    config = LearnerConfig(ordering="k1", tile_widths="framework")
+    trained = Training(task="3v2", learner=config, episodes=total, seed=measure.SEED)
+    durations, stages = learned.learn_in_stages(trained, trials, begins, measure.BLOCK)
+    blocks = durations.reshape(trials, -1, measure.BLOCK).mean(axis=2)
+    return {
+        "curves_s": blocks.round(3).tolist(),
+        "stages": [
+            {
+                "begin": stage.begin,
+                "behaviour": learned.behaviour(stage),
+                "hold_share_by_distance_to_T1_m": learned.hold_share_by_distance(stage.held),
+            }
+            for stage in stages
+        ],
+        "belief_errors": learned.belief_errors(stages[-1].held),
+    }
+
+
+def write_page(folder: Path, part: dict[str, Any]) -> int:
+    """Keep numbers beside those of other parts, and write the page of all."""
+    path = folder / "fidelity.json"
+    kept: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {"made": {}}
+    command = shlex.join(["scripts/checks/fidelity.py", *sys.argv[1:]])
+    kept |= part
+    kept["made"] |= {name: {"command": command, "code_version": code_version()} for name in part}
+    path.write_text(json.dumps(kept, indent=1) + "\n")
+    (folder / "fidelity.md").write_text(page(json.loads(path.read_text())))
+    print(f"written: {path}, {folder / 'fidelity.md'}", file=sys.stderr)
+    return 0
+
+
+def say(part: dict[str, Any]) -> int:
+    """Print numbers as one JSON object."""
+    print(json.dumps(part))
     return 0
 
 
@@ -206,6 +260,8 @@ def parse() -> argparse.Namespace:
         "--only", nargs="+", default=[], metavar="WORD", help="cells with these: 3v2 2005 360 hand"
     )
     parser.add_argument("--learning", action="store_true", help="learning instead of hold times")
+    parser.add_argument("--learned", action="store_true", help="what learned keepers do, believe")
+    parser.add_argument("--page", type=Path, metavar="DIR", help="keep numbers, write the page")
     parser.add_argument("--seeds", type=int, default=8, help="learning curves of each profile")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the picture")
     parser.add_argument("--json", action="store_true", help="one JSON object")

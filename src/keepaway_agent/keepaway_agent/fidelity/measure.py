@@ -69,7 +69,7 @@ class Measured(NamedTuple):
     @property
     def reached(self) -> bool:
         """Are mean and share out of bounds as near as they should be?"""
-        near = abs(self.ratio.estimate - 1.0) <= self.cell.goal
+        near = self.cell.is_near(self.mean)
         return near and (self.cell.out is None or abs(self.out - self.cell.out) <= GOAL_OUT)
 
     def to_dict(self) -> dict[str, Any]:
@@ -91,6 +91,7 @@ class Measured(NamedTuple):
                 "std_s": cell.std,
                 "out_of_bounds_share": cell.out,
                 "episodes": cell.n,
+                "second_session_mean_s": cell.second,
             },
             "ratio": self.ratio._asdict(),
             "goal": cell.goal,

@@ -15,11 +15,15 @@ PROFILES: Final = {"2005": "E05", "v19": "D19"}
 
 POLICIES: Final = ("random", "hold", "hand")
 TASKS: Final = ("3v2", "4v3")
-GOALS: Final = {"random": 0.10, "hold": 0.10, "hand": 0.25}
+GOALS: Final = {"random": 0.08, "hold": 0.08, "hand": 0.15}
 """How far our mean may be off at 360 degrees."""
 
 
-GOAL_NARROW: Final = 0.20  # the same at 90 degrees
+GOALS_NARROW: Final = {"random": 0.10, "hold": 0.10, "hand": 0.20}
+"""The same at 90 degrees."""
+
+
+GOAL_BETWEEN: Final = 0.10  # the same from the mean of two sessions of the real server
 GOAL_OUT: Final = 0.10  # how far the share of episodes that end out of bounds may be off
 
 
@@ -36,11 +40,24 @@ class Cell:
     std: float | None = None
     out: float | None = None  # share that ended out of bounds
     n: int | None = None  # episodes
+    second: float | None = None  # mean of a second session of the same
 
     @property
     def goal(self) -> float:
         """The share by which our mean may be off."""
-        return GOALS[self.policy] if self.visible_angle == 360 else GOAL_NARROW
+        return (GOALS if self.visible_angle == 360 else GOALS_NARROW)[self.policy]
+
+    def is_near(self, mean: float) -> bool:
+        """Is a mean duration [s] as near to the reference as it should be?
+
+        Within the goal, or two standard errors; where there were two sessions, between them or
+        near their mean: one session differs from another by more than its standard error.
+        """
+        if self.second is not None:
+            low, high = sorted((self.mean, self.second))
+            middle = 0.5 * (low + high)
+            return low <= mean <= high or abs(mean / middle - 1.0) <= GOAL_BETWEEN
+        return abs(mean - self.mean) <= max(self.goal * self.mean, 2.0 * self.sem)
 
 
 def reference(name: str) -> dict[str, Any]:
@@ -53,8 +70,16 @@ def reference(name: str) -> dict[str, Any]:
 def reference_cells() -> list[Cell]:
     """All measurements of hold times."""
     times = reference("hold_times")
+    second = times["E05"]["second_session"]
     return [
-        Cell(profile, angle, task, policy, **numbers)
+        Cell(
+            profile,
+            angle,
+            task,
+            policy,
+            **numbers,
+            second=second[task][policy]["mean"] if (name, angle) == ("E05", 360) else None,
+        )
         for profile, name in PROFILES.items()
         for angle in (360, 90)
         for task, policies in times[name].get(f"visible_angle_{angle}", {}).items()
