@@ -3,8 +3,8 @@
 import numpy as np
 
 from keepaway_agent.fidelity.reference import (
-    GOAL_NARROW,
     GOALS,
+    GOALS_NARROW,
     PROFILES,
     Cell,
     reference,
@@ -31,7 +31,7 @@ def test_every_number_of_the_file_is_in_a_cell():
 
 
 def test_a_narrow_view_has_a_goal_of_its_own():
-    assert Cell("2005", 90, "3v2", "hand", 9.0, 0.1).goal == GOAL_NARROW
+    assert Cell("2005", 90, "3v2", "hand", 9.0, 0.1).goal == GOALS_NARROW["hand"]
     assert Cell("2005", 360, "3v2", "hand", 6.0, 0.1).goal == GOALS["hand"]
 
 

@@ -186,12 +186,14 @@ def _holds_before(held: Held, same: np.ndarray, row: int) -> int:
 
 
 def hold_share_by_distance(held: Held) -> dict[str, float]:
-    """Share of holding where the nearest taker is believed so far away."""
+    """Share of holding where the nearest taker is believed so far away; no entry where never."""
     near = held.believed[:, 1]
-    return {
-        f"{low:g}-{high:g}": float(1.0 - held.passes[(near >= low) & (near < high)].mean())
-        for low, high in NEAR_BINS
-    }
+    shares = {}
+    for low, high in NEAR_BINS:
+        passes = held.passes[(near >= low) & (near < high)]
+        if len(passes):
+            shares[f"{low:g}-{high:g}"] = float(1.0 - passes.mean())
+    return shares
 
 
 def belief_errors(held: Held) -> dict[str, dict[str, tuple[float, float]]]:
