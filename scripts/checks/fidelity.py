@@ -29,7 +29,7 @@ import numpy as np
 from tqdm import tqdm
 
 from keepaway_agent.fidelity import learned, measure, reference
-from keepaway_agent.fidelity.figures import draw_durations, draw_learning
+from keepaway_agent.fidelity.figures import draw_band, draw_durations, draw_learning
 from keepaway_agent.fidelity.measure import Measured
 from keepaway_agent.fidelity.page import page
 from keepaway_agent.fidelity.reference import Cell
@@ -50,7 +50,11 @@ def main() -> int:
         return 1
     if arguments.learned:
         part = {"learned": learned_numbers(arguments.seeds, arguments.only == ["short"])}
-        return write_page(arguments.page, part) if arguments.page else say(part)
+        if not arguments.page:
+            return say(part)
+        name = arguments.page / "learned.png"
+        save(draw_band(np.array(part["learned"]["curves_s"])), name, "scripts/checks/fidelity.py")
+        return write_page(arguments.page, part)
     if arguments.learning:
         profiles = [name for name in reference.PROFILES if any(c.profile == name for c in cells)]
         curves = learn(profiles, arguments.seeds, arguments.workers)

@@ -111,3 +111,28 @@ def draw_learning(curves: Mapping[str, np.ndarray]) -> Figure:
     panels[0].set_ylabel(f"mean duration of {BLOCK} episodes (s)", fontsize=8)
     panels[0].set_ylim(bottom=0)
     return figure
+
+
+def draw_band(ours: np.ndarray) -> Figure:
+    """Learning curves of 3v2, 2005, as a band (mean and two deviations), the real runs on top.
+
+    Args:
+        ours: (num_trials, num_blocks) means of successive blocks of episodes [s].
+    """
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    axes = figure.subplots()
+    episodes = BLOCK * (np.arange(ours.shape[1]) + 1)
+    mean, spread = ours.mean(axis=0), 2.0 * ours.std(axis=0, ddof=1)
+    axes.fill_between(episodes, mean - spread, mean + spread, color=OURS, alpha=0.2, linewidth=0)
+    axes.plot(episodes, mean, color=OURS, linewidth=2.2, label=f"here, {len(ours)} trials")
+    for number, theirs in enumerate(reference_curves("2005")):
+        axes.plot(
+            BLOCK * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,
+            linewidth=1.2, label="" if number else "real server, single runs",
+        )  # fmt: skip
+    axes.set_xlabel("episodes", fontsize=8)
+    axes.set_ylabel(f"mean duration of {BLOCK} episodes (s)", fontsize=8)
+    axes.set_ylim(bottom=0)
+    axes.tick_params(labelsize=8)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    return figure

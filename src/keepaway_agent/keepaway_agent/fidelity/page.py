@@ -103,6 +103,7 @@ def _learned(learned: Mapping[str, Any]) -> list[str]:
     ]
     return [
         f"Means of {BLOCK} episodes of 3v2 (s), {len(durations)} trials here.\n",
+        "![learning](learned.png)\n",
         table(header[: 2 + len(curves)], rows),
         _behaviour(learned["stages"]),
         _beliefs(learned["belief_errors"]),
