@@ -1,10 +1,15 @@
 """The measures of fidelity, on made-up play, and the page that is written from their numbers."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from keepaway_agent.fidelity import learned, trajectories
+from keepaway_agent.fidelity import learned, page, trajectories
 from keepaway_agent.fidelity.reference import Cell, reference_cells
+
+DOCS = Path(__file__).resolve().parents[3] / "src" / "keepaway_sim" / "docs"
 
 
 def held(rows):
@@ -90,3 +95,8 @@ def test_process_statistics_of_a_pass():
     assert found["keeper_kicks"] == 1
     assert found["taker_speed"] == pytest.approx(1.0)
     assert np.isnan(found["first_taker_reach"])
+
+
+def test_the_page_is_what_its_numbers_say():
+    numbers = json.loads((DOCS / "fidelity.json").read_text())
+    assert (DOCS / "fidelity.md").read_text() == page.page(numbers)
