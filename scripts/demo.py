@@ -7,7 +7,7 @@
 2. 3v2 keepers learn for longer, in one program without ROS.
 3. The transfer node carries a 3v2 keeper's weights to 4v3, by rho.
 4. 4v3 keepers play on from them, again each a ROS node.
-5. A small study: learning curves of 4v3 from scratch and after transfer.
+5. A small study: learning curves of 4v3 from scratch, after transfer, and from an optimistic start.
 """
 
 from __future__ import annotations
@@ -44,11 +44,20 @@ from keepaway_transfer.studies.processes import WorkerExecutor
 SCRIPTS = Path(__file__).resolve().parent
 DOMAIN = 97  # the demo's own, unless one is set: it receives no other match
 THRESHOLD = 9.0  # [s] the paper's for 4v3
+OPTIMISTIC = "optimistic@5"  # the control: every action worth 5 s, nothing learned before
 CYCLES_PER_HOUR = 36000
 PROGRESS_EVERY = 10.0  # [s]
 MARK = "made_by_the_demo.txt"  # what an earlier demo made is replaced only beside this file
 MADE = ("3v2_nodes", "3v2_bag", "3v2_trained", "4v3_start.npz", "4v3_starts", "4v3_nodes",
         "4v3_bag", "learning_curves.png")  # fmt: skip
+
+
+NEXT = (
+    ("watch the match", "view.py {out}/3v2_bag"),
+    ("see what was learned", "describe.py {out}/4v3_start.npz --draw {out}/pictures"),
+    ("write an agent", "new_agent.py quick_keeper"),
+    ("run the paper's study", "study.py table2 --workers 2 --out {out}/table2"),
+)
 
 
 class DemoError(RuntimeError):
@@ -62,8 +71,8 @@ class Args:
     out: Path = Path("out/demo")  # folder of all files; what an earlier demo made there is replaced
     seed: int = 0  # every random number follows from it
     episodes: int = 60  # of the recorded 3v2 match
-    source_hours: float = 6.0  # simulated, of 3v2 training of every trial
-    target_hours: float = 6.0  # simulated, of 4v3 training of every trial
+    source_hours: float = 4.0  # simulated, of 3v2 training of every trial
+    target_hours: float = 5.0  # simulated, of 4v3 training of every trial
     trials: int = 8  # of the small study
 
 
@@ -119,14 +128,16 @@ def play(args: Args) -> int:
     print(transfer_by_node(sources[0], carried))
     say("4. 4v3 keepers play on from it as ROS nodes, learning")
     moved = match(args, "4v3", "learn", args.out / "4v3_nodes", args.out / "4v3_bag", carried)
-    say(f"5. learning curves: 4v3 from scratch and after transfer, {args.trials} trials each")
+    say(f"5. 4v3 from scratch, after transfer, from an optimistic start: {args.trials} trials each")
     curves = study(args, sources)
     figure = draw(args, curves)
     say("done")
     print(table(learned, moved, curves))
     print(f"\nlearning curves  {figure}\nbags             {args.out}/3v2_bag, {args.out}/4v3_bag")
     print(f"weights          {args.out}/3v2_nodes, {args.out}/3v2_trained, {carried}")
-    print(f"watch the match  .venv/bin/python scripts/view.py {args.out}/3v2_bag")
+    print("\nwhat next")
+    for what, command in NEXT:
+        print(f"  {what:24s} .venv/bin/python scripts/{command.format(out=args.out)}")
     return 0
 
 
@@ -214,16 +225,22 @@ def transfer_by_node(source: Path, target: Path) -> str:
 
 
 def study(args: Args, sources: Sequence[Path]) -> dict[str, list[np.ndarray]]:
-    """Episode durations [s] of every 4v3 trial, from scratch and from its own 3v2 keeper."""
-    starts = []
+    """Episode durations [s] of every 4v3 trial, by what its keepers started from."""
+    after, optimistic = [], []
     for number, source in enumerate(sources):
-        carried = transferred(load_weights(source), Transfer("4v3"))
+        keeper = load_weights(source)
+        carried = transferred(keeper, Transfer("4v3"))
         save_weights(args.out / "4v3_starts" / f"trial_{number:04d}.npz", carried)
-        starts.append(carried.values)
+        after.append(carried.values)
+        optimistic.append(transferred(keeper, Transfer("4v3", OPTIMISTIC)).values)
+    starts: dict[str, Sequence[np.ndarray | None]] = {
+        "from scratch": [None] * len(sources),
+        "after transfer from 3v2": after,
+        "from an optimistic start": optimistic,
+    }
     with WorkerExecutor(2) as pool:
-        scratch = pool.submit(learn_4v3, args, [None] * len(starts), "from scratch")
-        after = pool.submit(learn_4v3, args, starts, "after transfer")
-        return {"from scratch": scratch.result(), "after transfer from 3v2": after.result()}
+        waiting = {how: pool.submit(learn_4v3, args, starts[how], how) for how in starts}
+        return {how: future.result() for how, future in waiting.items()}
 
 
 def learn_4v3(args: Args, starts: Sequence[np.ndarray | None], label: str) -> list[np.ndarray]:
