@@ -166,7 +166,7 @@ def check_perceptions(data: np.ndarray, player: int) -> None:
     """
     whose = data["player_index"]
     _refuse(whose, whose != player, f"player_index of a perception of player {player}")
-    place = data["positions"].reshape(len(data), -1, 2)
+    place = data["positions"].reshape(*data["ages"].shape, 2)
     off = ~(np.abs(place) < _FARTHEST) & (data["ages"] < NEVER)[:, :, None]
     _refuse(place, off, "positions of a perception")
 

@@ -287,7 +287,7 @@ def _rows_of(keys: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 def _add_perceptions(track: Track, keys: np.ndarray, player: int, data: np.ndarray) -> None:
     at = _rows_of(keys, checked.moment_keys(data))
     data, at = data[at >= 0], at[at >= 0]
-    track.believed[at, player] = data["positions"].reshape(len(at), -1, 2)
+    track.believed[at, player] = data["positions"].reshape(len(at), *track.believed.shape[2:])
     track.age[at, player] = data["ages"]
     track.kickable[at, player] = data["ball_kickable"]
     track.due[at, player] = data["decision_due"]
