@@ -36,6 +36,10 @@ def test_arms_that_never_reach_the_threshold_do_not_differ():
     assert statistics.logrank([9.0, 9.0], [False, False], [9.0], [False]) == 1.0
 
 
+def test_arms_that_all_take_the_same_time_do_not_differ():
+    assert statistics.logrank([2.0, 2.0], [True, True], [2.0], [True]) == 1.0
+
+
 def test_kaplan_meier_counts_a_censored_trial_as_at_risk_until_it_stopped():
     curve = statistics.kaplan_meier(TIMES, REACHED)
     assert curve.times.tolist() == [2, 3, 5, 8]

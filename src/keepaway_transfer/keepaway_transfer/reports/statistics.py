@@ -171,9 +171,10 @@ def logrank(
 ) -> float:
     """The p-value of the two-sided log-rank test that both arms reach the threshold alike.
 
-    It is 1 if no trial of either did.
+    It is 1 if no trial of either did, or if all took the same time.
     """
-    if not (np.any(first_reached) or np.any(second_reached)):
+    times = np.concatenate([_floats(first), _floats(second)])
+    if np.ptp(times) == 0 or not (np.any(first_reached) or np.any(second_reached)):
         return 1.0
     return float(
         stats.logrank(_censored(first, first_reached), _censored(second, second_reached)).pvalue
