@@ -46,7 +46,9 @@ def test_the_optimistic_study_learns_from_no_source():
     assert levels == [None, 2, 5, 8, 12, 20]
 
 
-@pytest.mark.parametrize("name", ["table2_averaged", "table2_rescaled", "table2_at_5"])
+@pytest.mark.parametrize(
+    "name", ["table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled"]
+)
 def test_tables_of_other_ways_have_the_sources_of_table2(name):
     table2, other = load_study("table2"), load_study(name)
     assert other.rows[0] == table2.rows[0]

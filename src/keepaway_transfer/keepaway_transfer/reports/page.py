@@ -26,7 +26,7 @@ from keepaway_transfer.reports.report import power, spread
 from keepaway_transfer.reports.statistics import holm
 from keepaway_transfer.reports.summary import verdict
 
-TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5")
+TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled")
 LOWER_THRESHOLD = 8.2  # [s] at which Table 2 is measured a second time
 NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
 
