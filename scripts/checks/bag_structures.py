@@ -79,7 +79,7 @@ def odd_json(messages: list[Said], case: random.Random) -> list[Said]:
         config = json.loads(values["config_json"])
         group = config[case.choice([name for name in config if isinstance(config[name], dict)])]
         group[case.choice(list(group))] = case.choice(SHAPES)
-        values["config_json"] = json.dumps(case.choice([config, config, *SHAPES]))
+        values["config_json"] = json.dumps(case.choice([config, config, *SHAPES]), allow_nan=True)
     except (ValueError, TypeError, KeyError, IndexError):
         values["config_json"] = case.choice(TEXTS)
     messages[0] = said._replace(data=layout.encode(values))
@@ -169,7 +169,8 @@ def structure_reader(source: Path, folder: Path) -> Callable[[bytes], object]:
     def read(data: bytes) -> object:
         case = random.Random(data)
         path = folder / "case.mcap"
-        agents = json.dumps(case.choice([{}, {"keeper_1": {"policy": "hand"}}, *SHAPES]))
+        shape = case.choice([{}, {"keeper_1": {"policy": "hand"}}, *SHAPES])
+        agents = json.dumps(shape, allow_nan=True)
         write(path, changed(messages, case), agents, case)
         refusals = [refusal for tool in TOOLS if (refusal := _refusal(tool, path))]
         if len(refusals) == len(TOOLS):

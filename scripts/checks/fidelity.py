@@ -111,7 +111,7 @@ def write_page(folder: Path, part: dict[str, Any]) -> int:
     command = shlex.join(["scripts/checks/fidelity.py", *sys.argv[1:]])
     kept |= part
     kept["made"] |= {name: {"command": command, "code_version": code_version()} for name in part}
-    path.write_text(json.dumps(kept, indent=1) + "\n")
+    path.write_text(json.dumps(kept, indent=1, allow_nan=False) + "\n")
     (folder / "fidelity.md").write_text(page(json.loads(path.read_text())))
     print(f"written: {path}, {folder / 'fidelity.md'}", file=sys.stderr)
     return 0
@@ -119,7 +119,7 @@ def write_page(folder: Path, part: dict[str, Any]) -> int:
 
 def say(part: dict[str, Any]) -> int:
     """Print numbers as one JSON object."""
-    print(json.dumps(part))
+    print(json.dumps(part, allow_nan=False))
     return 0
 
 

@@ -38,7 +38,7 @@ def declared(package: str) -> list[str]:
 def test_what_is_imported_is_declared_once_and_nothing_else(package: str) -> None:
     names = declared(package)
     assert sorted(names) == sorted(set(names))
-    assert set(names) == imported(package)
+    assert set(names) == {name.lower() for name in imported(package)}  # as rosdep's keys are
 
 
 @pytest.mark.parametrize("package", PACKAGES)

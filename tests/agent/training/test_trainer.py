@@ -239,7 +239,7 @@ def test_rules_that_never_stop_a_trial_are_refused():
         StopRule(max_episodes=1, window=0)
     with pytest.raises(AgentError, match="keeper policy 'best'"):
         play([make_trial(0, keeper_policy="best")], 1)
-    with pytest.raises(AgentError, match="ordering 'x'"):
+    with pytest.raises(AgentError, match="ordering='x'"):
         Trainer(TrainerConfig(learner=LearnerConfig(ordering="x")), 1)
 
 
