@@ -172,7 +172,7 @@ def test_topics_and_their_types(start: Callable[[str], Node], name: str) -> None
             else f"keepaway_msgs/{message_type}"
             for topic, (message_type, told, _) in documented.items()
             for player in names
-            if told.split(",")[0] == direction
+            if direction in told.split(",")[0].split(" and ")
         }
 
 

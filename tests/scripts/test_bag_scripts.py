@@ -32,7 +32,7 @@ def test_repair_bag_makes_a_whole_one_and_leaves_the_other(cut_off: Path) -> Non
     assert told.returncode == 0, told.stderr
     whole = BagReader(cut_off.with_name("bag_repaired"))
     assert whole.complete
-    assert f"{whole.message_count} messages of" in told.stdout
+    assert f"{whole.message_count} messages\n" in told.stdout
     assert (cut_off / "bag_0.mcap").read_bytes() == before
     again = run("repair_bag", cut_off)
     assert again.returncode == 1

@@ -35,7 +35,7 @@ def endurance() -> ModuleType:
 
 def test_a_short_benchmark_of_the_world_has_all_its_figures() -> None:
     command = [sys.executable, str(ROOT / "scripts/checks/benchmark.py"), "--only", "world"]
-    options = ["--fields", "4", "--cycles", "60", "--json"]
+    options = ["--fields", "4", "--cycles", "400", "--json"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     figures = json.loads(done.stdout.splitlines()[-1])

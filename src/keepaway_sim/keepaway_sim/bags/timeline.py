@@ -16,6 +16,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.messages import (
     ACTION_REQUEST,
     CLOCK,
+    CYCLE_NS,
     EPISODE,
     FIELD_STATE,
     PERCEPTION,
@@ -23,7 +24,7 @@ from keepaway_sim.wire.messages import (
     stamp_of,
 )
 
-_REMEMBERED_CYCLES = 100  # whose time is known when a request answers them
+_REMEMBERED_EPISODES = 4  # whose kick-off is known when a request of theirs comes
 _STAMPED = (PERCEPTION, FIELD_STATE, EPISODE, CLOCK)
 
 
@@ -33,7 +34,7 @@ class OwnTimes:
     def __init__(self) -> None:
         """Nothing was said yet."""
         self._last = 0
-        self._times: dict[tuple[int, int], int] = {}  # of an episode's cycles
+        self._kick_offs: dict[int, int] = {}  # [ns] by episode
 
     def of(self, message_type: str, data: bytes) -> int:
         """By its stamp, or the moment that it answers, or the last time that is known.
@@ -46,18 +47,24 @@ class OwnTimes:
             if own is not None:
                 self._last = own
                 if message_type == PERCEPTION:
-                    self._remember(read_head(PERCEPTION, data)[:2], own)
+                    self._remember(*read_head(PERCEPTION, data)[:2], own)
                 return own
             if message_type == ACTION_REQUEST:
-                return self._times.get(read_head(ACTION_REQUEST, data)[:2], self._last)
+                return self._answered(*read_head(ACTION_REQUEST, data)[:2])
         except struct.error as error:
             raise KeepawayError(f"{len(data)} bytes are no {message_type}: {error}") from error
         return self._last
 
-    def _remember(self, moment: tuple[int, int], time_ns: int) -> None:
-        self._times[moment] = time_ns
-        if len(self._times) > _REMEMBERED_CYCLES:
-            del self._times[next(iter(self._times))]
+    def _remember(self, episode: int, cycle: int, time_ns: int) -> None:
+        self._kick_offs[episode] = time_ns - cycle * CYCLE_NS
+        if len(self._kick_offs) > _REMEMBERED_EPISODES:
+            del self._kick_offs[next(iter(self._kick_offs))]
+
+    def _answered(self, episode: int, cycle: int) -> int:
+        """When the cycle was that a request answers, even if its perception comes later."""
+        if episode not in self._kick_offs:
+            return self._last
+        return self._kick_offs[episode] + cycle * CYCLE_NS
 
 
 class Timeline:
