@@ -9,7 +9,7 @@ import json
 import signal
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -132,16 +132,33 @@ class Recorder(Node):
             how many messages.
         """
         count = 0
-        for topic, (message_type, subscription) in list(self._subscriptions_by_topic.items()):
-            for data in take_all(subscription):
-                self._record(topic, message_type, data)
-                count += 1
+        for topic, message_type, data in self._taken():
+            self._record(topic, message_type, data)
+            count += 1
         if self._is_listening_to_players():
             self._report(max(0, self.gaps.complete_until()), is_behind=count > 0)
         if time.monotonic() - self._flushed > FLUSH_PERIOD:
             self.bag.flush()
             self._flushed = time.monotonic()
         return count
+
+    def _taken(self) -> Iterator[tuple[str, str, bytes]]:
+        """What has come: topic, type, bytes.
+
+        Requests are taken first and given last: what they answer was published before them, so it
+        has been taken then, and its time is known.
+        """
+        known = list(self._subscriptions_by_topic.items())
+        requests = [
+            (topic, kind, data)
+            for topic, (kind, subscription) in known
+            if kind == ACTION_REQUEST
+            for data in take_all(subscription)
+        ]
+        for topic, (kind, subscription) in known:
+            if kind != ACTION_REQUEST:
+                yield from ((topic, kind, data) for data in take_all(subscription))
+        yield from requests
 
     def finish(self) -> str:
         """Take what is still coming, and close the bag.
