@@ -59,7 +59,7 @@ def test_a_frame_has_room_for_everything_once(name: str) -> None:
     task = Task.parse(name)
     starts, size = layout(task)
     num, objects, keepers = task.num_players, task.num_players + 1, task.num_keepers
-    assert size == 2 + 2 * objects + 6 * num + 3 * num * objects + num * keepers
+    assert size == 3 + 2 * objects + 6 * num + 3 * num * objects + num * keepers
     assert list(starts.values()) == sorted(set(starts.values()))
 
 
