@@ -19,8 +19,10 @@ ROOT = Path(__file__).resolve().parents[1]
 hypothesis.settings.register_profile("keepaway", deadline=None)  # a busy machine is no fault
 hypothesis.settings.load_profile("keepaway")
 
-# A shell lets its background jobs ignore Ctrl-C, and whatever they start: not what tests start.
+# A shell lets its background jobs ignore Ctrl-C, nohup a closed terminal, and whatever they start
+# does so too: not what tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

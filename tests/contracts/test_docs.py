@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,15 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
         if not target.exists() or (wants_heading and anchor not in anchors(target)):
             broken.append(link)
     assert not broken
+
+
+def test_a_site_is_built_of_all_pages_and_docstrings(tmp_path: Path) -> None:
+    command = [sys.executable, str(ROOT / "scripts/docs.py"), "--out", str(tmp_path / "site")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    site = tmp_path / "site"
+    assert (site / "src/keepaway_transfer/docs/results.html").is_file()
+    assert "read_trials" in (site / "api/keepaway_transfer.studies.results.html").read_text()
 
 
 @pytest.mark.parametrize("tutorial", TUTORIALS)

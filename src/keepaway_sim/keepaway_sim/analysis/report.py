@@ -128,10 +128,11 @@ def in_words(summary: Mapping[str, Any]) -> str:
             f"{summary['missing']}"
         )
     sem = summary["sem_duration_s"]
-    spread = f" +- {sem:.2f}" if sem is not None else ""
+    # Episodes of players that learn depend on each other; a bag does not tell who learned.
+    spread = f" +- {sem:.2f} (if nobody learned)" if sem is not None else ""
     lines = [
         f"{summary['task']}: {summary['episodes']:,} episodes in {summary['messages']:,} messages",
-        f"held {summary['mean_duration_s']:.2f}{spread} s on average,"
+        f"held {summary['mean_duration_s']:.2f} s{spread} on average,"
         f" {summary['out_of_bounds_share']:.0%} ended out of bounds,"
         f" {_passes(summary)}",
         summary["missing"],

@@ -58,4 +58,3 @@ function chartTop(durations) {
   const last = sorted.length - 1;
   return Math.max(1, sorted[sorted.length <= FEW ? last : Math.floor(0.98 * last)] * 1.1);
 }
-
