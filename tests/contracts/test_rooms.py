@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"sim": "keepaway_sim", "agent": "keepaway_agent", "transfer": "keepaway_transfer"}
 BESIDE = {"agent": {"examples"}}
 """Folders of tests whose sources lie beside the package."""
-WORDS_THAT_ARE_NO_PATHS = re.compile(r"[<>*{}$ ,]|\.\.|NAME|BAG|out/|results/|^/")
+WORDS_THAT_ARE_NO_PATHS = re.compile(r"^\.venv/|[<>*{}$ ,]|\.\.|NAME|BAG|out/|results/|^/")
 
 
 def rooms(folder: Path) -> set[str]:
