@@ -30,7 +30,7 @@ def declared(package: str) -> list[str]:
     keys = [str(each.text) for each in root.findall("exec_depend")]
     lines = (SRC / package / "requirements.txt").read_text().splitlines()
     return [key.removeprefix(KEY) for key in keys] + [
-        line for line in lines if line and not line.startswith("#")
+        line.partition("==")[0] for line in lines if line and not line.startswith("#")
     ]
 
 
