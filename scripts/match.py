@@ -276,10 +276,13 @@ def judge_end(name: str, code: int, board: Scoreboard, restart: bool) -> None:
 
 
 def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str]:
-    """The parameters with which a node that was killed resumes where it was."""
+    """The parameters with which a node that was killed resumes where it was.
+
+    A simulator resumes its own match whoever else publishes one here: players know it by its id.
+    """
     if name != "simulator":
         return ["-p", "resume:=true"]
-    first = ["-p", f"first_episode:={board.next_episode}"]
+    first = ["-p", f"first_episode:={board.next_episode}", "-p", "force:=true"]
     return [*first, "-p", f"record:={json.dumps(free_folder(args.record), allow_nan=False)}"]
 
 

@@ -25,6 +25,7 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import rclpy
@@ -184,14 +185,19 @@ class Intruders:
         """Publish an episode that nobody played."""
         self._episodes.publish(Episode(number=number, cycles=10_000, duration=1000.0))
 
-    def end(self) -> None:
-        """End the simulator.
+    def check(self) -> None:
+        """The simulator is there.
 
         Raises:
-            LossError: it was not there to the end.
+            LossError: it has ended.
         """
         if self._process.poll() is not None:
             raise LossError(f"the second simulator ended with code {self._process.returncode}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._process.wait()
 
@@ -220,27 +226,16 @@ def main() -> int:
 
 def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[str, object]:
     """One fault after the other, everything checked after each; then the end of the match."""
-    random = np.random.default_rng(args.seed)
     witness, executor = Witness(), EventsExecutor()
     executor.add_node(witness)
-    faults: Counter[str] = Counter()
     wait_for_episodes(executor, witness, 1)
-    started, intruders = time.monotonic(), Intruders(witness, folder)
-    for number in range(args.faults):
-        intruders.disturb(number)
-        listen(executor, float(random.exponential(args.period)))
-        fault = inject_fault(match, random, executor, args)
-        faults[fault] += 1
-        if fault == "simulator killed" or number % FAULTS_AN_EPISODE == 0:
-            wait_for_episodes(executor, witness, 1)
-        if number % FAULTS_A_PAUSE == FAULTS_A_PAUSE - 1:
-            wait_for_everybody(executor, witness)
-        match.check_weights()
-        check_numbers(witness.numbers)
-    wait_for_everybody(executor, witness)
-    wait_for_episodes(executor, witness, 3)
-    summary = match.end()
-    intruders.end()
+    started = time.monotonic()
+    with Intruders(witness, folder) as intruders:
+        faults = one_by_one(match, executor, witness, intruders, args)
+        wait_for_everybody(executor, witness)
+        wait_for_episodes(executor, witness, 3)
+        summary = match.end()
+        intruders.check()
     listen(executor, 0.5)
     check_numbers(witness.numbers)
     match.check_weights()
@@ -257,6 +252,29 @@ def inject_faults(match: Match, args: argparse.Namespace, folder: Path) -> dict[
         "episodes_in_bags": recorded,
         "weights_episodes": match.known,
     }
+
+
+def one_by_one(
+    match: Match,
+    executor: Executor,
+    witness: Witness,
+    intruders: Intruders,
+    args: argparse.Namespace,
+) -> Counter[str]:
+    """Inject the faults, with what must hold checked after each; how many there were of a kind."""
+    random, faults = np.random.default_rng(args.seed), Counter[str]()
+    for number in range(args.faults):
+        intruders.disturb(number)
+        listen(executor, float(random.exponential(args.period)))
+        fault = inject_fault(match, random, executor, args)
+        faults[fault] += 1
+        if fault == "simulator killed" or number % FAULTS_AN_EPISODE == 0:
+            wait_for_episodes(executor, witness, 1)
+        if number % FAULTS_A_PAUSE == FAULTS_A_PAUSE - 1:
+            wait_for_everybody(executor, witness)
+        match.check_weights()
+        check_numbers(witness.numbers)
+    return faults
 
 
 def inject_fault(
