@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,17 +47,24 @@ def trainer(num_fields: int) -> Play:
 
 def vector(num_fields: int, wait_for: str) -> Play:
     """Many fields of one World."""
-    env, rng = KeeperVectorEnv(num_fields, wait_for=wait_for), np.random.default_rng(0)
+    env, choices = KeeperVectorEnv(num_fields, wait_for=wait_for), _choices(num_fields)
     env.reset(seed=0)
 
     def play(cycles: int) -> int:
         played = 0
         while played < cycles * num_fields:
-            _, _, ended, _, infos = env.step(rng.integers(3, size=num_fields))
+            _, _, ended, _, infos = env.step(next(choices))
             played += int(infos["cycle"][ended].sum())
         return played
 
     return play
+
+
+def _choices(num_fields: int) -> Iterator[np.ndarray]:
+    """Random choices for every field, drawn many at a time as the trainer draws its own."""
+    rng = np.random.default_rng(0)
+    while True:
+        yield from rng.integers(3, size=(500, num_fields))
 
 
 def single() -> Play:

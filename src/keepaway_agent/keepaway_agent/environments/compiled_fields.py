@@ -13,6 +13,7 @@ from keepaway_agent.learning.features import (
     rank_players,
     taker_state,
 )
+from keepaway_agent.training.deciding import decide_all
 
 NO_CHOICE = -1
 """The choice of a player who has none to make."""
@@ -87,25 +88,29 @@ def rank_as_taker(d, f, p):
 
 
 @compiled_apart
-def note_choices(d, outside, moved, in_play, choosing, moving):
-    """After a cycle: who has a choice to make from outside, and where one goes on to wait for it.
+def decide_and_note(d, outside, moved, in_play, choosing, cycles, moving):
+    """After a cycle: everybody answers by rule; who has a choice to make from outside now?
 
     Args:
-        d: Deciders, after `decide_all`.
+        d: Deciders.
         outside: (num_players,) bool, whose choices are made from outside.
         moved: (num_fields,) bool, where the cycle was played.
         in_play: (num_fields,) bool, where the end of the episode is waited for as well.
         choosing: (num_fields, num_players) bool, written.
-        moving: (num_fields,) bool, written: fields that moved, and have nothing to stop for.
+        cycles: (num_fields,) int64, one more where the cycle was played.
+        moving: (num_fields,) bool, written: fields that moved, and have nothing to stop for; may
+            be `moved` itself.
 
     Returns:
         how many fields have come to a stop, and how many are moving.
     """
+    decide_all(d, moved)
     num_stopped, num_moving = 0, 0
     for f in range(len(moved)):
-        moving[f] = False
         if not moved[f]:
+            moving[f] = False
             continue
+        cycles[f] += 1
         stops = in_play[f] and d.belief.outcome[f] != Outcome.IN_PLAY
         for p in range(len(outside)):
             choosing[f, p] = d.chose[f, p] and outside[p]

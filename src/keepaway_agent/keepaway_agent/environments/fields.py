@@ -12,7 +12,7 @@ from keepaway_agent.compiled import Kernel
 from keepaway_agent.environments.compiled_fields import (
     NO_CHOICE,
     choose_all,
-    note_choices,
+    decide_and_note,
     observe_keepers,
     observe_takers,
 )
@@ -29,7 +29,7 @@ from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.cmac import make_tiling
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE
 from keepaway_agent.playing.policies import TAKER_DECISION_INTERVAL, make_player
-from keepaway_agent.training.deciding import Deciders, decide_all
+from keepaway_agent.training.deciding import Deciders
 from keepaway_agent.training.trial import child_seed
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
@@ -98,11 +98,11 @@ class DecisionFields:
         self._everywhere = np.ones(self.num_fields, dtype=np.bool_)
         self._nowhere = np.zeros(self.num_fields, dtype=np.bool_)
         self._moving = np.zeros(self.num_fields, dtype=np.bool_)
+        self._uncounted = np.zeros(self.num_fields, dtype=np.int64)
         self._streams = RandomStreams(shape[0] * shape[1], UNIFORMS_PER_CHOICE, block=512)
         self._deciders = self._make_deciders(shape)
-        self._decide_all = Kernel(decide_all, self._deciders)
         self._choose_all = Kernel(choose_all, self._deciders)
-        self._note_choices = Kernel(note_choices, self._deciders)
+        self._decide_and_note = Kernel(decide_and_note, self._deciders, self._outside)
         self._observe = {
             Role.KEEPER: Kernel(observe_keepers, self._deciders),
             Role.TAKER: Kernel(observe_takers, self._deciders),
@@ -196,7 +196,7 @@ class DecisionFields:
         self._seed_policies(field, seed)
         self._world.start(field, child_seed(seed, 0))
         self._is_started = True
-        self._look(np.arange(self.num_fields) == field, self._nowhere)
+        self._look(np.arange(self.num_fields) == field, self._nowhere, self._uncounted)
 
     def _seed_policies(self, field: int, seed: np.random.SeedSequence) -> None:
         first = field * self.task.num_players
@@ -221,12 +221,12 @@ class DecisionFields:
 
     def step(self, moved: np.ndarray) -> None:
         """Play a cycle on the fields of (num_fields,) `moved`; time stands still on the others."""
-        self._step(moved, self._nowhere)
+        self._step(moved, self._nowhere, self._uncounted)
 
-    def _step(self, moved: np.ndarray, in_play: np.ndarray) -> tuple[int, int]:
-        """Play a cycle; results and `in_play` are those of `note_choices`."""
+    def _step(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> tuple[int, int]:
+        """Play a cycle; results, `in_play` and `cycles` are those of `decide_and_note`."""
         self._world.step(self._deciders.action, self._deciders.target, moved)
-        return self._look(moved, in_play)
+        return self._look(moved, in_play, cycles)
 
     def play_on(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> None:
         """Play every field of `moved` to its next choice.
@@ -240,13 +240,12 @@ class DecisionFields:
         Raises:
             AgentError: nobody gets a choice; the world's constants leave nobody a game.
         """
-        left = int(moved.sum())
+        left = int(np.count_nonzero(moved))
         for _ in range(PATIENCE):
             if not left:
                 return
-            cycles += moved
-            _, left = self._step(moved, in_play)
-            moved = self._moving.copy()
+            _, left = self._step(moved, in_play, cycles)
+            moved = self._moving
         raise AgentError(_STUCK)
 
     def play_until_any(self, in_play: np.ndarray, cycles: np.ndarray) -> None:
@@ -255,8 +254,7 @@ class DecisionFields:
         Arguments and errors are those of `play_on`.
         """
         for _ in range(PATIENCE):
-            cycles += 1
-            if self._step(self._everywhere, in_play)[0]:
+            if self._step(self._everywhere, in_play, cycles)[0]:
                 return
         raise AgentError(_STUCK)
 
@@ -333,12 +331,11 @@ class DecisionFields:
         takers, rows = self._deciders.takers, self._taker_slice(field)
         return np.stack([takers.action[rows], takers.cycle[rows], takers.target[rows]])
 
-    def _look(self, moved: np.ndarray, in_play: np.ndarray) -> tuple[int, int]:
+    def _look(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> tuple[int, int]:
         """Let everybody answer by rule where time went by, and find out who has a choice."""
         self._streams.refill()
-        self._decide_all(moved)
-        found: tuple[int, int] = self._note_choices(
-            self._outside, moved, in_play, self.choosing, self._moving
+        found: tuple[int, int] = self._decide_and_note(
+            moved, in_play, self.choosing, cycles, self._moving
         )
         for watch in self.watchers:
             watch(self)

@@ -109,6 +109,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._for_results = self._max_steps, variables, np.zeros(len(variables))
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
+        self._masks = dict.fromkeys((f"_{name}" for name in _INFOS), self._all)
 
     def _lay_kernels(self) -> None:
         """Bring together what the compiled functions work on; no array is ever replaced."""
@@ -186,8 +187,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         else:
             self._fields.play_until_any(books.in_play, books.cycles)
         results = self._results()
-        infos = self._infos(results)
-        return (*results[:4], infos)
+        return (*results[:4], self._infos(results))
 
     def _results(self) -> Results:
         """What a step gives; episodes that are long enough are cut off."""
@@ -262,13 +262,10 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._fields.close()
 
     def _infos(self, results: Results) -> dict[str, Any]:
-        infos = {
-            "choosing": results.choosing,
-            "cycles": results.cycles,
-            "cycle": results.cycle,
-            "keeper": results.keeper,
-        }
-        return infos | dict.fromkeys([f"_{name}" for name in infos], self._all)
+        return dict(zip(_INFOS, results[4:], strict=True)) | self._masks
+
+
+_INFOS = Results._fields[4:]
 
 
 def _books(num_fields: int) -> KeeperBooks:

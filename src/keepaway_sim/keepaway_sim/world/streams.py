@@ -50,7 +50,9 @@ class RandomStreams:
         self.draws = Draws(
             np.zeros((num_streams, block)), np.full(num_streams, block, dtype=np.int64)
         )
-        self._reserve = reserve
+        self._interval = max(1, block // (4 * reserve))  # looked at every so many calls of `refill`
+        self._lowest = reserve * self._interval  # numbers that last until the next look
+        self._calls_left = 0
         self._generators: list[np.random.Generator | None] = [None] * num_streams
 
     def seed(self, stream: int, generator: np.random.Generator) -> None:
@@ -61,7 +63,11 @@ class RandomStreams:
 
     def refill(self) -> None:
         """Make sure that every seeded stream can give `reserve` more numbers."""
-        low = self.draws.cursor > self.draws.uniforms.shape[1] - self._reserve
+        if self._calls_left > 0:
+            self._calls_left -= 1
+            return
+        self._calls_left = self._interval - 1
+        low = self.draws.cursor > self.draws.uniforms.shape[1] - self._lowest
         if not low.any():
             return
         for stream in np.flatnonzero(low):
@@ -89,6 +95,7 @@ class RandomStreams:
         start = len(row) - num_unread
         row[start:] = snapshot.unread
         self.draws.cursor[stream] = start
+        self._calls_left = 0  # it may stand at its last number
 
 
 @compiled
