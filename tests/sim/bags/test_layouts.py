@@ -73,7 +73,7 @@ def test_windows_that_are_too_small_change_nothing(
     change: Callable[[Many], Many],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Memory is bounded by reading chunks again: with windows of 20 kB, 40 times."""
+    """Memory is bounded by sorting on the disk: with windows of 20 kB, hundreds of runs."""
     path = write(tmp_path / "bag.mcap", change(messages), chunk_size=30_000)
     expected = sorted(m.data for m in BagReader(match).messages())
     monkeypatch.setattr(merging, "WINDOW_SIZE", 20_000)

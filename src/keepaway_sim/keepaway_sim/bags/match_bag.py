@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.bags import checked
+from keepaway_sim.bags.blocks import Block
 from keepaway_sim.bags.matches import find_matches
-from keepaway_sim.bags.merging import Block, merged
+from keepaway_sim.bags.merging import merged
 from keepaway_sim.bags.moments import Moments, Sorter
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.timeline import Timeline, chosen_match

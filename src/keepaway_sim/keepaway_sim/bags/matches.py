@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.bags import checked, rows
-from keepaway_sim.bags.merging import Piece
+from keepaway_sim.bags.blocks import Piece
 from keepaway_sim.bags.reader import BagReader, Place
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task

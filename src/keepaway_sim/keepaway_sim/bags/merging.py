@@ -1,46 +1,54 @@
 """Messages of chunks that overlap, or stand in any order, brought into one order.
 
-As much is read at once as fits a window: a range of keys (times, or moments of a match) that few
-chunks have messages of. Where many chunks have, the window is made smaller, and chunks are read
-once for each window that they reach into: memory is bounded, whatever the order.
+As much is read at once as fits a window: a range of keys (times, or moments of a match). A chunk is
+read once for each window that it reaches into. Where that would be many chunks for every window,
+they are sorted on the disk first (`spilling`): memory is bounded, whatever the order, and so is the
+work.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
+from keepaway_sim.bags.blocks import Block, Piece, joined
+from keepaway_sim.bags.spilling import spilled
+
 WINDOW_SIZE = 2**24  # [bytes] of messages that are brought into order together
-
-
-class Piece(NamedTuple):
-    """Messages that stand together in a file, and the range of their keys."""
-
-    low: int
-    high: int  # the largest key, itself included
-    size: int  # [bytes]
-    source: Any  # what `load` is called with
-
-
-class Block(NamedTuple):
-    """Messages in the order of their keys."""
-
-    data: bytes
-    rows: np.ndarray  # (n, 4) int64: topic's number, log time, first and last byte in data
-    keys: np.ndarray  # (n,) int64
+DEEPEST = 8  # windows of messages that may reach over one key without sorting them first
 
 
 def merged(pieces: Iterable[Piece], load: Callable[[Any], Block]) -> Iterator[Block]:
     """The messages of all pieces in the order of their keys; those of one key in given order.
 
     No key is in two blocks, unless its messages do not fit a window.
+
+    Raises:
+        KeepawayError: no room on the disk to sort them.
     """
+    ranked = [piece._replace(rank=rank) for rank, piece in enumerate(pieces)]
+    if _depth(ranked) <= DEEPEST * WINDOW_SIZE:
+        yield from _merged(ranked, load)
+    else:
+        with spilled(ranked, load, WINDOW_SIZE) as (runs, load_run):
+            yield from _merged(runs, load_run)
+
+
+def _depth(pieces: Sequence[Piece]) -> int:
+    """The most bytes of pieces that reach over one key and beyond."""
+    wide = [piece for piece in pieces if piece.low < piece.high]
+    edges = [(piece.low, piece.size) for piece in wide] + [(p.high, -p.size) for p in wide]
+    return max(accumulate(size for _, size in sorted(edges)), default=0)
+
+
+def _merged(pieces: Iterable[Piece], load: Callable[[Any], Block]) -> Iterator[Block]:
     waiting = sorted(pieces, key=lambda piece: piece.low)
     floor = -(2**63)
     while waiting:
-        top = _first_top(waiting)
+        top = _first_top(waiting, floor)
         kept, top, only = _gather(waiting, load, floor, top)
         if only is not None:
             yield from kept
@@ -48,18 +56,20 @@ def merged(pieces: Iterable[Piece], load: Callable[[Any], Block]) -> Iterator[Bl
             floor = only + 1
         else:
             if sum(len(block.rows) for block in kept):
-                yield _sorted(kept)
+                ranks = [piece.rank for piece in waiting[: len(kept)]]
+                order = sorted(range(len(kept)), key=ranks.__getitem__)
+                yield joined([kept[place] for place in order])
             if top is None:
                 return
             floor = top
         waiting = [piece for piece in waiting if piece.high >= floor]
 
 
-def _first_top(waiting: Sequence[Piece]) -> int | None:
+def _first_top(waiting: Sequence[Piece], floor: int) -> int | None:
     """Where the window ends that the first pieces fill; None: all of them fit."""
-    size = 0
+    size, lowest = 0, max(floor, waiting[0].low)
     for piece in waiting:
-        if size >= WINDOW_SIZE and piece.low > waiting[0].low:
+        if size >= WINDOW_SIZE and piece.low > lowest:
             return piece.low
         size += piece.size
     return None
@@ -103,34 +113,8 @@ def _rest_of(pieces: Sequence[Piece], load: Callable[[Any], Block], key: int) ->
 
 
 def _cut(block: Block, floor: int, top: int | None) -> Block:
-    """The messages of floor <= key < top; their bytes by themselves, where they are few."""
-    data, rows, keys = block
-    wanted = keys >= floor
+    """The messages of floor <= key < top."""
+    wanted = block.keys >= floor
     if top is not None:
-        wanted &= keys < top
-    rows, keys = rows[wanted], keys[wanted]
-    used = int((rows[:, 3] - rows[:, 2]).sum())
-    if used >= len(data) // 2:
-        return Block(data, rows, keys)
-    packed = b"".join([data[first:last] for first, last in rows[:, 2:].tolist()])
-    ends = np.cumsum(rows[:, 3] - rows[:, 2])
-    rows = rows.copy()
-    rows[:, 2], rows[:, 3] = ends - (rows[:, 3] - rows[:, 2]), ends
-    return Block(packed, rows, keys)
-
-
-def _sorted(blocks: Sequence[Block]) -> Block:
-    """All blocks as one, in the order of keys."""
-    if len(blocks) == 1:
-        data, rows, keys = blocks[0]
-    else:
-        starts = np.cumsum([0, *(len(block.data) for block in blocks)])
-        data = b"".join(block.data for block in blocks)
-        rows = np.concatenate([block.rows for block in blocks])
-        keys = np.concatenate([block.keys for block in blocks])
-        shift = np.repeat(starts[:-1], [len(block.rows) for block in blocks])
-        rows[:, 2:] += shift[:, None]
-    if (np.diff(keys) < 0).any():
-        order = np.argsort(keys, kind="stable")
-        rows, keys = rows[order], keys[order]
-    return Block(data, rows, keys)
+        wanted &= block.keys < top
+    return Block(block.data, block.rows[wanted], block.keys[wanted]).packed()

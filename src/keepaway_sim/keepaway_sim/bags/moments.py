@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from keepaway_sim.bags import checked, rows
+from keepaway_sim.bags.blocks import Block
 from keepaway_sim.bags.matches import Found
-from keepaway_sim.bags.merging import Block
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.cdr import Codec

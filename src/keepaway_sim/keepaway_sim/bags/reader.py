@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from keepaway_sim.bags.blocks import Block, Piece
 from keepaway_sim.bags.chunks import Run
 from keepaway_sim.bags.files import bag_files
 from keepaway_sim.bags.mcap_reader import McapFile
-from keepaway_sim.bags.merging import Block, Piece, merged
+from keepaway_sim.bags.merging import merged
 from keepaway_sim.bags.topics import Batch, Recorded, Topic
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire import cdr
