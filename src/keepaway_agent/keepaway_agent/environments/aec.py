@@ -10,17 +10,16 @@ from gymnasium.spaces import Box, Discrete
 from pettingzoo import AECEnv
 from pettingzoo.utils.env import AECIterable
 
-from keepaway_agent.environments.one_field import OneField
+from keepaway_agent.environments.one_field import OneField, OneFieldEnv
 from keepaway_agent.environments.refusals import (
     InvalidActionError,
     ResetNeededError,
     checked_action,
-    checked_limit,
 )
 from keepaway_agent.environments.snapshots import TurnState, require_kind
 
 
-class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
+class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
     """One field, turn by turn: who has a choice is selected, and time stands still meanwhile.
 
     A keeper chooses between holding the ball (0) and passing to K(k+1) (k), when it can kick the
@@ -57,15 +56,9 @@ class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
             AgentError, KeepawayError: settings that make no match.
         """
         super().__init__()
-        self._max_cycles = checked_limit("max_cycles", max_cycles)
-        self._field = OneField(teams, render_mode, settings)
-        self.render_mode = self._field.render_mode
-        self.possible_agents = self._field.names[:]
-        self.agents: list[str] = []
+        self._lay_out(teams, max_cycles, render_mode, settings)
         self.observation_spaces = self._field.observation_spaces
-        num_actions = self._field.fields.task.num_keepers
-        self.action_spaces = {name: Discrete(num_actions) for name in self.possible_agents}
-        self.state_space = self._field.state_space
+        self.action_spaces = {name: Discrete(self._num_choices) for name in self.possible_agents}
         self._choices: dict[str, int] = {}
 
     def observation_space(self, agent: str) -> Box:
@@ -105,15 +98,6 @@ class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
         """
         self._field.fields.require_started()
         return self._field.observe(agent)
-
-    def state(self) -> np.ndarray:
-        """The truth, which no player knows: see `spaces.state_space`.
-
-        Raises:
-            ResetNeededError, ClosedError: see `refusals`.
-        """
-        self._field.fields.require_started()
-        return self._field.state()
 
     def last(self, observe: bool = True) -> Any:
         """What the selected agent sees, its reward since its last choice, and how things are.
@@ -185,19 +169,6 @@ class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
         sums = self._cumulative_rewards
         return self.rewards, sums, self.terminations, self.truncations, self.infos
 
-    def render(self) -> Any:
-        """As the render mode says; None without one, and in a window.
-
-        Raises:
-            ResetNeededError, ClosedError: see `refusals`.
-        """
-        self._field.fields.require_started()
-        return self._field.camera.render()
-
-    def close(self) -> None:
-        """Play no more, and close the window."""
-        self._field.close()
-
     def _play_on(self) -> None:
         """Let all choices of a moment come into force, and play to the next ones."""
         self._field.choose(self._choices)
@@ -205,7 +176,7 @@ class KeepawayAECEnv(AECEnv[str, np.ndarray, int]):
         cycles = self._field.play_to_choice(until_the_end=True)
         self.rewards = {name: self._field.reward(name) * cycles for name in self.agents}
         over = self._field.is_over
-        late = not over and self._field.cycle >= self._max_cycles
+        late = not over and self._field.cycle >= self.max_cycles
         self.terminations = dict.fromkeys(self.agents, over)
         self.truncations = dict.fromkeys(self.agents, late)
         self._tell_cycle()

@@ -13,7 +13,8 @@ from keepaway_agent.learning.features import (
     rank_players,
     taker_state,
 )
-from keepaway_agent.training.deciding import decide_all
+from keepaway_agent.training.deciding import decide
+from keepaway_sim.world.cycle import begin_cycle, end_cycle
 
 NO_CHOICE = -1
 """The choice of a player who has none to make."""
@@ -87,38 +88,79 @@ def rank_as_taker(d, f, p):
     rank_players(position, n, holder, p, BY_BALL, d.order)
 
 
+class Play(NamedTuple):
+    """What `play` goes by, of every field; each (num_fields,)."""
+
+    moving: np.ndarray  # bool, time goes by, and there has been nothing to stop for yet
+    in_play: np.ndarray  # bool, the end of the episode is something to stop for as well
+    left: np.ndarray  # int64, cycles to play at most
+    cycles: np.ndarray  # int64, counts those that are played
+
+
 @compiled_apart
-def decide_and_note(d, outside, moved, in_play, choosing, cycles, moving):
-    """After a cycle: everybody answers by rule; who has a choice to make from outside now?
+def play(w, d, outside, latest, choosing, plays):
+    """Play every moving field on, each at its own pace, as far as it goes without outside help.
+
+    A field stops where somebody has a choice to make from outside. It waits where discs may touch:
+    then they are to be moved (`Bodies.move`); and where random numbers run short. After that, this
+    is called again.
 
     Args:
+        w: Fields of the World.
         d: Deciders.
         outside: (num_players,) bool, whose choices are made from outside.
-        moved: (num_fields,) bool, where the cycle was played.
-        in_play: (num_fields,) bool, where the end of the episode is waited for as well.
-        choosing: (num_fields, num_players) bool, written.
-        cycles: (num_fields,) int64, one more where the cycle was played.
-        moving: (num_fields,) bool, written: fields that moved, and have nothing to stop for; may
-            be `moved` itself.
+        latest: (2,) int64, `RandomStreams.latest` of the world and of the players.
+        choosing: (num_fields, num_players) bool, written: who has a choice to make from outside.
+        plays: Play, updated.
 
     Returns:
-        how many fields have come to a stop, and how many are moving.
+        how many fields have come to a stop, whether discs are to be moved, whether random numbers
+        are short.
     """
-    decide_all(d, moved)
-    num_stopped, num_moving = 0, 0
-    for f in range(len(moved)):
-        if not moved[f]:
-            moving[f] = False
-            continue
-        cycles[f] += 1
-        stops = in_play[f] and d.belief.outcome[f] != Outcome.IN_PLAY
-        for p in range(len(outside)):
-            choosing[f, p] = d.chose[f, p] and outside[p]
-            stops = stops or choosing[f, p]
-        moving[f] = not stops
-        num_stopped += stops
-        num_moving += not stops
-    return num_stopped, num_moving
+    num_stopped, is_short = 0, False
+    for begins in (False, True):  # first what waited for its discs, whose slots are then free
+        w.bodies.num_asked[0] *= not begins
+        for f in range(len(plays.moving)):
+            while plays.moving[f] and plays.left[f] > 0:
+                if w.bodies.slot[f] < 0:
+                    if not begins:
+                        break
+                    if runs_short(w, d, f, latest):
+                        is_short = True
+                        break
+                    begin_cycle(w, f, d.action, d.target)
+                    if w.bodies.slot[f] >= 0:
+                        break
+                end_cycle(w, f)
+                w.bodies.slot[f] = -1
+                decide(d, f)
+                num_stopped += note_choices(d, f, outside, choosing, plays)
+    return num_stopped, w.bodies.num_asked[0] > 0, is_short
+
+
+@compiled
+def runs_short(w, d, f, latest):
+    """Are there too few random numbers for another cycle of field f?"""
+    if w.random.cursor[f] > latest[0]:
+        return True
+    num_players = d.policy.shape[1]
+    for stream in range(f * num_players, (f + 1) * num_players):
+        if d.random.cursor[stream] > latest[1]:
+            return True
+    return False
+
+
+@compiled
+def note_choices(d, f, outside, choosing, plays):
+    """After a cycle of field f: who has a choice to make from outside? Whether it stops."""
+    stops = plays.in_play[f] and d.belief.outcome[f] != Outcome.IN_PLAY
+    for p in range(len(outside)):
+        choosing[f, p] = d.chose[f, p] and outside[p]
+        stops = stops or choosing[f, p]
+    plays.cycles[f] += 1
+    plays.left[f] -= 1
+    plays.moving[f] = not stops
+    return stops
 
 
 @compiled_apart

@@ -11,10 +11,11 @@ from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.compiled import Kernel
 from keepaway_agent.environments.compiled_fields import (
     NO_CHOICE,
+    Play,
     choose_all,
-    decide_and_note,
     observe_keepers,
     observe_takers,
+    play,
 )
 from keepaway_agent.environments.refusals import (
     MAX_FIELDS,
@@ -92,25 +93,38 @@ class DecisionFields:
         self._outside[n:] = taker_policy == OUTSIDE
         self._keeper = _rule_player(0, n, keeper_policy, ordering, interval)
         self._taker = _rule_player(n, n, taker_policy, "ball", interval)
-        self._world = World(self.task, _checked_config(config), self.num_fields)
+        config = _checked_config(config)
+        self._world = World(self.task, config, self.num_fields, is_stepped=False)
+        self._is_started, self._is_closed = False, False
+        self.watchers: list[Callable[[DecisionFields], None]] = []
+        self._high = {role: observation_space(self.task, role).high for role in Role}
+        self._state = {role: np.zeros(len(self._high[role])) for role in Role}
+        self._lay_arrays()
+        self._lay_kernels()
+
+    def _lay_arrays(self) -> None:
+        """Make what the compiled functions read and write."""
         shape = (self.num_fields, self.task.num_players)
         self.choosing = np.zeros(shape, dtype=np.bool_)
         self._everywhere = np.ones(self.num_fields, dtype=np.bool_)
         self._nowhere = np.zeros(self.num_fields, dtype=np.bool_)
         self._moving = np.zeros(self.num_fields, dtype=np.bool_)
+        self._left = np.zeros(self.num_fields, dtype=np.int64)
         self._uncounted = np.zeros(self.num_fields, dtype=np.int64)
         self._streams = RandomStreams(shape[0] * shape[1], UNIFORMS_PER_CHOICE, block=512)
         self._deciders = self._make_deciders(shape)
+
+    def _lay_kernels(self) -> None:
+        """Bring together what the compiled functions work on."""
         self._choose_all = Kernel(choose_all, self._deciders)
-        self._decide_and_note = Kernel(decide_and_note, self._deciders, self._outside)
+        latest = np.array([self._world.streams.latest, self._streams.latest])
+        self._play = Kernel(
+            play, self._world.fields, self._deciders, self._outside, latest, self.choosing
+        )
         self._observe = {
             Role.KEEPER: Kernel(observe_keepers, self._deciders),
             Role.TAKER: Kernel(observe_takers, self._deciders),
         }
-        self._high = {role: observation_space(self.task, role).high for role in Role}
-        self._state = {role: np.zeros(len(self._high[role])) for role in Role}
-        self._is_started, self._is_closed = False, False
-        self.watchers: list[Callable[[DecisionFields], None]] = []
 
     def _make_deciders(self, shape: tuple[int, int]) -> Deciders:
         """The players; those from outside have a stand-in, and nobody learns."""
@@ -194,9 +208,9 @@ class DecisionFields:
         """Begin anew on a field, with all random numbers from this seed."""
         self.require_open()
         self._seed_policies(field, seed)
-        self._world.start(field, child_seed(seed, 0))
+        self._world.seed(field, child_seed(seed, 0))
         self._is_started = True
-        self._look(np.arange(self.num_fields) == field, self._nowhere, self._uncounted)
+        self.step(np.arange(self.num_fields) == field)
 
     def _seed_policies(self, field: int, seed: np.random.SeedSequence) -> None:
         first = field * self.task.num_players
@@ -206,8 +220,7 @@ class DecisionFields:
 
     def abort(self, fields: np.ndarray) -> None:
         """End the episodes of (num_fields,) bool `fields`; their next cycle kicks off new ones."""
-        for field in np.flatnonzero(fields & ~self.is_over):
-            self._world.abort(int(field))
+        self._world.abort(fields & ~self.is_over)
         self.choosing[fields] = False
 
     def choose(self, choices: np.ndarray) -> None:
@@ -221,15 +234,10 @@ class DecisionFields:
 
     def step(self, moved: np.ndarray) -> None:
         """Play a cycle on the fields of (num_fields,) `moved`; time stands still on the others."""
-        self._step(moved, self._nowhere, self._uncounted)
-
-    def _step(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> tuple[int, int]:
-        """Play a cycle; results, `in_play` and `cycles` are those of `decide_and_note`."""
-        self._world.step(self._deciders.action, self._deciders.target, moved)
-        return self._look(moved, in_play, cycles)
+        self._advance(self._plays(moved, self._nowhere, self._uncounted), 1)
 
     def play_on(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> None:
-        """Play every field of `moved` to its next choice.
+        """Play every field of `moved` to its next choice, each at its own pace.
 
         Args:
             moved: (num_fields,) bool.
@@ -240,23 +248,47 @@ class DecisionFields:
         Raises:
             AgentError: nobody gets a choice; the world's constants leave nobody a game.
         """
-        left = int(np.count_nonzero(moved))
-        for _ in range(PATIENCE):
-            if not left:
-                return
-            _, left = self._step(moved, in_play, cycles)
-            moved = self._moving
-        raise AgentError(_STUCK)
+        plays = self._plays(moved, in_play, cycles)
+        most = 1 if self.watchers else PATIENCE
+        rounds = PATIENCE // most
+        while plays.moving.any():
+            if rounds == 0:
+                raise AgentError(_STUCK)
+            rounds -= 1
+            self._advance(plays, most)
 
     def play_until_any(self, in_play: np.ndarray, cycles: np.ndarray) -> None:
-        """Play all fields until there is a choice on one, or the end of an episode.
+        """Play all fields, in step, until there is a choice on one, or the end of an episode.
 
         Arguments and errors are those of `play_on`.
         """
+        plays = self._plays(self._everywhere, in_play, cycles)
         for _ in range(PATIENCE):
-            if self._step(self._everywhere, in_play, cycles)[0]:
+            if self._advance(plays, 1):
                 return
+            plays.moving.fill(True)
         raise AgentError(_STUCK)
+
+    def _plays(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> Play:
+        """What compiled code goes by; arguments as of `play_on`."""
+        self._moving[:] = moved
+        return Play(self._moving, in_play, self._left, cycles)
+
+    def _advance(self, plays: Play, most: int) -> int:
+        """Play moving fields to their next stop, `most` cycles at most; how many have stopped."""
+        plays.left.fill(most)
+        num_stopped, touches, is_short = self._play(plays)
+        while touches or is_short:
+            if touches:
+                self._world.bodies.move()
+            if is_short:
+                self._world.streams.top_up()
+                self._streams.top_up()
+            newly, touches, is_short = self._play(plays)
+            num_stopped += newly
+        for watch in self.watchers:
+            watch(self)
+        return int(num_stopped)
 
     def observe(self, role: Role, who: np.ndarray, into: np.ndarray) -> None:
         """Write what one player of every field sees.
@@ -330,16 +362,6 @@ class DecisionFields:
     def _taker_rows(self, field: int) -> np.ndarray:
         takers, rows = self._deciders.takers, self._taker_slice(field)
         return np.stack([takers.action[rows], takers.cycle[rows], takers.target[rows]])
-
-    def _look(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> tuple[int, int]:
-        """Let everybody answer by rule where time went by, and find out who has a choice."""
-        self._streams.refill()
-        found: tuple[int, int] = self._decide_and_note(
-            moved, in_play, self.choosing, cycles, self._moving
-        )
-        for watch in self.watchers:
-            watch(self)
-        return found
 
 
 def _rule_player(index: int, num_keepers: int, policy: Any, ordering: Any, interval: int) -> Any:

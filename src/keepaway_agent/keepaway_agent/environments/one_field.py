@@ -11,7 +11,7 @@ from keepaway_agent.actions import Role
 from keepaway_agent.environments.camera import Camera
 from keepaway_agent.environments.compiled_fields import NO_CHOICE
 from keepaway_agent.environments.fields import OUTSIDE, DecisionFields
-from keepaway_agent.environments.refusals import checked_mode, checked_seed
+from keepaway_agent.environments.refusals import checked_limit, checked_mode, checked_seed
 from keepaway_agent.environments.snapshots import FieldState, with_new_luck
 from keepaway_agent.environments.spaces import observation_space, state_space
 from keepaway_agent.errors import AgentError
@@ -149,6 +149,51 @@ class OneField:
         if not isinstance(name, str) or name not in self._players:
             raise AgentError(f"agent={name!r}: the agents are {', '.join(self._players)}")
         return self._players[name]
+
+
+class OneFieldEnv:
+    """What is the same whether agents act in turn or at once: the field, its truth, its pictures.
+
+    Attributes:
+        max_cycles: an episode is cut off (truncated) after so many.
+        render_mode: None or one of `OneField.RENDER_MODES`.
+        possible_agents, agents: names of all, and of those that have not finished.
+        state_space: of `state`.
+    """
+
+    def _lay_out(
+        self, teams: str, max_cycles: int | None, render_mode: str | None, settings: dict[str, Any]
+    ) -> None:
+        """Lay out the field; arguments and errors are those of both constructors."""
+        self.max_cycles = checked_limit("max_cycles", max_cycles)
+        self._field = OneField(teams, render_mode, settings)
+        self._num_choices = self._field.fields.task.num_keepers
+        self.render_mode = self._field.render_mode
+        self.possible_agents = self._field.names[:]
+        self.agents: list[str] = []
+        self.state_space = self._field.state_space
+
+    def state(self) -> np.ndarray:
+        """The truth, which no player knows: see `spaces.state_space`.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._field.fields.require_started()
+        return self._field.state()
+
+    def render(self) -> Any:
+        """As the render mode says; None without one, and in a window.
+
+        Raises:
+            ResetNeededError, ClosedError: see `refusals`.
+        """
+        self._field.fields.require_started()
+        return self._field.camera.render()
+
+    def close(self) -> None:
+        """Play no more, and close the window."""
+        self._field.close()
 
 
 def _completed(teams: str, settings: dict[str, Any]) -> dict[str, Any]:

@@ -8,13 +8,12 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from keepaway_agent.environments.one_field import OneField
+from keepaway_agent.environments.one_field import OneField, OneFieldEnv
 from keepaway_agent.environments.refusals import (
     MAX_CYCLES,
     InvalidActionError,
     ResetNeededError,
     checked_action,
-    checked_limit,
 )
 from keepaway_agent.environments.snapshots import CycleState, require_kind
 
@@ -22,16 +21,13 @@ Observation = dict[str, np.ndarray]
 """An agent's "observation" and "action_mask"."""
 
 
-class KeepawayParallelEnv(ParallelEnv[str, Observation, int]):
+class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
     """One field, a cycle of 0.1 s a step: all agents act at once.
 
     Players decide at different moments. So there is one action more than choices, "nothing", and
     an agent's observation has a mask: either all choices, or nothing alone. Whoever chooses where
     the mask forbids it is not refused (random agents do so): a choice out of turn does nothing,
     and nothing in place of a choice holds the ball, or lets a taker choose again a cycle later.
-
-    Attributes:
-        max_cycles: an episode is cut off (truncated) after so many cycles.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -60,12 +56,7 @@ class KeepawayParallelEnv(ParallelEnv[str, Observation, int]):
         Raises:
             AgentError, KeepawayError: settings that make no match.
         """
-        self.max_cycles = checked_limit("max_cycles", max_cycles)
-        self._field = OneField(teams, render_mode, settings)
-        self.render_mode = self._field.render_mode
-        self.possible_agents = self._field.names[:]
-        self.agents: list[str] = []
-        self._num_choices = self._field.fields.task.num_keepers
+        self._lay_out(teams, max_cycles, render_mode, settings)
         self.observation_spaces = {
             name: spaces.Dict(
                 {
@@ -78,7 +69,6 @@ class KeepawayParallelEnv(ParallelEnv[str, Observation, int]):
         self.action_spaces = {
             name: spaces.Discrete(self._num_choices + 1) for name in self.possible_agents
         }
-        self.state_space = self._field.state_space
 
     @property
     def nothing(self) -> int:
@@ -160,28 +150,6 @@ class KeepawayParallelEnv(ParallelEnv[str, Observation, int]):
         self._field.set_state(require_kind(state, CycleState).field, seed)
         self.agents = state.agents[:]
         return self._observations(), self._infos()
-
-    def state(self) -> np.ndarray:
-        """The truth, which no player knows: see `spaces.state_space`.
-
-        Raises:
-            ResetNeededError, ClosedError: see `refusals`.
-        """
-        self._field.fields.require_started()
-        return self._field.state()
-
-    def render(self) -> Any:
-        """As the render mode says; None without one, and in a window.
-
-        Raises:
-            ResetNeededError, ClosedError: see `refusals`.
-        """
-        self._field.fields.require_started()
-        return self._field.camera.render()
-
-    def close(self) -> None:
-        """Play no more, and close the window."""
-        self._field.close()
 
     def _choices(self, actions: Any) -> dict[str, int]:
         """Choices that come into force: those of agents who have one to make."""

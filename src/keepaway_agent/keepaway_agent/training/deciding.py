@@ -46,16 +46,21 @@ def decide_all(d, asked):
         asked: (num_fields,) bool, which fields are looked at.
     """
     for f in range(len(asked)):
-        if not asked[f]:
-            continue
-        for p in range(d.policy.shape[1]):
-            d.chose[f, p] = False
-            if d.belief.outcome[f] != Outcome.IN_PLAY:
-                _end_episode(d, f, p)
-            elif d.belief.decision_due[f, p]:
-                _answer(d, f, p)
-            elif p < d.keeper.num_keepers:
-                keep_passing(d.keepers, f * d.keeper.num_keepers + p, d.belief.cycle[f])
+        if asked[f]:
+            decide(d, f)
+
+
+@compiled
+def decide(d, f):
+    """Let every player of field f answer whose answer is due, or pay them all at the end."""
+    for p in range(d.policy.shape[1]):
+        d.chose[f, p] = False
+        if d.belief.outcome[f] != Outcome.IN_PLAY:
+            _end_episode(d, f, p)
+        elif d.belief.decision_due[f, p]:
+            _answer(d, f, p)
+        elif p < d.keeper.num_keepers:
+            keep_passing(d.keepers, f * d.keeper.num_keepers + p, d.belief.cycle[f])
 
 
 @compiled

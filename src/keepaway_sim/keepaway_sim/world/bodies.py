@@ -15,7 +15,7 @@ from keepaway_sim.world.state import Discs
 
 SLOTS_A_ROW = 16  # slots of one space lie in rows of so many
 CELL = 16.0  # [m] of the grid by which pymunk finds neighbours
-SPACES = 8  # spaces of different sizes, the smallest of which holds an eighth of the fields
+SPACES = 8  # spaces of an eighth of the fields, two eighths..; smaller ones hold 1, 2, 4..
 
 
 class Bodies:
@@ -60,11 +60,17 @@ class Bodies:
         discs.touched[:] = False
         if num_asked == 0:
             return
-        size = min(-(-num_asked // self._step) * self._step, len(discs.place))
+        size = self._size(num_asked)
         space = self._spaces.get(size) or self._spaces.setdefault(size, _Space(discs, size))
         discs.motion[num_asked:size, :, 2:] = 0.0  # slots of nobody rest
         touching = space.move()
         discs.touched[discs.asked[touching[touching < num_asked]]] = True
+
+    def _size(self, num_asked: int) -> int:
+        """Slots of the smallest space with room for so many fields."""
+        if num_asked <= self._step:
+            return min(1 << (num_asked - 1).bit_length(), self._step)
+        return min(-(-num_asked // self._step) * self._step, len(self.discs.place))
 
 
 class _Space:

@@ -83,18 +83,25 @@ def act(w, playing, action, target):
         return illegal
     w.bodies.num_asked[0] = 0
     for f in range(len(playing)):
-        w.bodies.slot[f] = -1
-        if not (playing[f] and w.truth.running[f] and w.belief.outcome[f] == _IN_PLAY):
-            continue
-        w.scratch.acceleration[:] = 0.0
-        for p in range(w.num_players):
-            _take_request(w, f, p, action[f, p], target[f, p])
-            _carry_out(w, f, p)
-        for o in range(w.ball + 1):
-            _set_off(w, f, o)
-        if physics.may_touch(w.truth.position[f], w.truth.velocity[f], w.bodies.radius):
-            _ask_pymunk(w, f)
+        if playing[f] and w.truth.running[f]:
+            begin_cycle(w, f, action, target)
     return -1
+
+
+@compiled
+def begin_cycle(w, f, action, target):
+    """Field f up to the point where its discs move: `bodies.slot` says whether pymunk is asked."""
+    w.bodies.slot[f], w.bodies.touched[f] = -1, False
+    if w.belief.outcome[f] != _IN_PLAY:
+        return
+    w.scratch.acceleration[:] = 0.0
+    for p in range(w.num_players):
+        _take_request(w, f, p, action[f, p], target[f, p])
+        _carry_out(w, f, p)
+    for o in range(w.ball + 1):
+        _set_off(w, f, o)
+    if physics.may_touch(w.truth.position[f], w.truth.velocity[f], w.bodies.radius):
+        _ask_pymunk(w, f)
 
 
 @compiled
@@ -199,15 +206,20 @@ def settle(w, playing):
         playing: (num_fields,) bool, as `act` had it.
     """
     for f in range(len(playing)):
-        if not (playing[f] and w.truth.running[f]):
-            continue
-        w.truth.time[f] += 1
-        if w.belief.outcome[f] != _IN_PLAY:
-            _kick_off(w, f)
-            continue
-        _come_to_rest(w, f)
-        _judge_ball(w, f)
-        _perceive(w, f)
+        if playing[f] and w.truth.running[f]:
+            end_cycle(w, f)
+
+
+@compiled
+def end_cycle(w, f):
+    """Field f from there on; where its episode had ended the next one kicks off."""
+    w.truth.time[f] += 1
+    if w.belief.outcome[f] != _IN_PLAY:
+        _kick_off(w, f)
+        return
+    _come_to_rest(w, f)
+    _judge_ball(w, f)
+    _perceive(w, f)
 
 
 @compiled

@@ -35,6 +35,7 @@ class RandomStreams:
 
     Attributes:
         draws: the ready-made numbers (`Draws`).
+        latest: the last cursor at which a stream gives `reserve` numbers.
     """
 
     def __init__(self, num_streams: int, reserve: int, block: int = 2048) -> None:
@@ -53,6 +54,7 @@ class RandomStreams:
         self._interval = max(1, block // (4 * reserve))  # looked at every so many calls of `refill`
         self._lowest = reserve * self._interval  # numbers that last until the next look
         self._calls_left = 0
+        self.latest = block - reserve
         self._generators: list[np.random.Generator | None] = [None] * num_streams
 
     def seed(self, stream: int, generator: np.random.Generator) -> None:
@@ -65,8 +67,12 @@ class RandomStreams:
         """Make sure that every seeded stream can give `reserve` more numbers."""
         if self._calls_left > 0:
             self._calls_left -= 1
-            return
-        self._calls_left = self._interval - 1
+        else:
+            self._calls_left = self._interval - 1
+            self.top_up()
+
+    def top_up(self) -> None:
+        """Do what `refill` does now and then, for who looks at the cursors himself."""
         low = self.draws.cursor > self.draws.uniforms.shape[1] - self._lowest
         if not low.any():
             return

@@ -40,8 +40,16 @@ class World:
         fields: every array of it (`Fields`), updated in place.
     """
 
-    def __init__(self, task: Task, config: Config, num_fields: int = 1) -> None:
+    def __init__(
+        self, task: Task, config: Config, num_fields: int = 1, *, is_stepped: bool = True
+    ) -> None:
         """Lay out the fields; each is idle until `start` gives it a seed.
+
+        Args:
+            task, config: what is played and how.
+            num_fields: side by side.
+            is_stepped: compile what `step` calls now. Who plays cycles by compiled functions of
+                his own (`begin_cycle`, `move`, `end_cycle`) needs none of it.
 
         Raises:
             KeepawayError: `num_fields` is not positive.
@@ -57,7 +65,8 @@ class World:
         self._everywhere = np.ones(num_fields, dtype=np.bool_)
         self._act, self._settle = Kernel(act, self.fields), Kernel(settle, self.fields)
         requests = self.truth.action, self.truth.target
-        prepare((self._act, (self._everywhere, *requests)), (self._settle, (self._everywhere,)))
+        if is_stepped:
+            prepare((self._act, (self._everywhere, *requests)), (self._settle, (self._everywhere,)))
 
     @property
     def truth(self) -> Truth:
@@ -80,6 +89,15 @@ class World:
         Raises:
             KeepawayError: no such field.
         """
+        self.seed(field, seed)
+        self._settle(np.arange(self.num_fields) == field)
+
+    def seed(self, field: int, seed: np.random.SeedSequence) -> None:
+        """Give a field a fresh trial with its own random numbers; its next cycle kicks off.
+
+        Raises:
+            KeepawayError: no such field.
+        """
         self._check_field(field)
         self._streams.seed(field, np.random.default_rng(seed))
         draws, truth, belief = self.fields.random, self.truth, self.belief
@@ -91,15 +109,14 @@ class World:
         self.fields.memory.self_error[field] = self.fields.memory.seen[field] = 0.0
         truth.time[field], truth.running[field] = -1, True  # the kick-off takes it to 0
         belief.episode[field], belief.outcome[field] = -1, Outcome.ABORTED
-        self._settle(np.arange(self.num_fields) == field)
 
     def stop(self, field: int) -> None:
         """Let a field rest: it is not simulated until it is started again."""
         self.truth.running[field] = False
         self.belief.decision_due[field] = False
 
-    def abort(self, field: int) -> None:
-        """End a field's episode from outside; its next step kicks off a new one."""
+    def abort(self, field: int | np.ndarray) -> None:
+        """End the episode of a field, or of (num_fields,) bool ones; the next step kicks off."""
         self.belief.outcome[field] = Outcome.ABORTED
         self.belief.decision_due[field] = False
 
@@ -131,6 +148,16 @@ class World:
             self._refuse(illegal, action, target)
         self._bodies.move()
         self._settle(playing)
+
+    @property
+    def streams(self) -> RandomStreams:
+        """The random numbers, one stream for each field."""
+        return self._streams
+
+    @property
+    def bodies(self) -> Bodies:
+        """The discs, which are moved between `begin_cycle` and `end_cycle`."""
+        return self._bodies
 
     def snapshot(self, field: int) -> FieldSnapshot:
         """Take down all there is of a field, random numbers included; it can be pickled.
