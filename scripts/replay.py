@@ -14,6 +14,7 @@ nothing: the world and the players are made anew, and must do again what was rec
 
 import argparse
 import select
+import signal
 import sys
 import termios
 import tty
@@ -32,10 +33,15 @@ from keepaway_agent.errors import AgentError
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.playback import Playback
 from keepaway_sim.bags.verify import check_world
+from keepaway_sim.cli.interrupts import Stopped
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.replayer import Replayer, ReplayerSettings, stoppable
 from keepaway_sim.wire.messages import SECOND
+
+
+class Quit(Exception):  # noqa: N818  # nothing went wrong
+    """The key that ends the replay."""
 
 
 def main() -> int:
@@ -60,7 +66,11 @@ def main() -> int:
     except (KeepawayError, InvalidParameterTypeException) as error:
         print(f"replay: {error}", file=sys.stderr)
         return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except Stopped as stopped:
+        return stopped.code
+    except KeyboardInterrupt:  # it had not begun
+        return 128 + signal.SIGINT
+    except (Quit, ExternalShutdownException):
         pass
     finally:
         rclpy.try_shutdown()
@@ -113,7 +123,7 @@ def obey_key(playback: Playback) -> None:
     elif key in ("+", "-"):
         playback.rate = playback.rate * (2.0 if key == "+" else 0.5)
     elif key == "q":
-        raise KeyboardInterrupt
+        raise Quit
     state = "paused" if playback.paused else f"x {playback.rate:g}"
     print(f"\r{playback.time / SECOND:9.1f} s  {state:8}", end="", flush=True)
 

@@ -274,6 +274,31 @@ def signals_to_a_live_view(folder: Path) -> None:
 
 
 @row(
+    "SIGTERM and SIGINT, in turn, at 30 moments of the start of `replay.py`",
+    "code 143 or 130, and at most one line",
+    is_long=True,
+)
+def signals_to_a_replay(folder: Path) -> None:
+    """Its start has no moment in which a signal leaves a traceback."""
+    bag = folder / "bag"
+    trial = ("--episodes", 3, "--trials", 1, "--record", bag)
+    expect_success(script("train.py", "--policy", "hand", *trial))
+    for number in range(30):
+        chosen = (signal.SIGTERM, signal.SIGINT)[number % 2]
+        command = script("replay.py", bag)
+        with subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment()
+        ) as started:
+            time.sleep(0.02 + 0.1 * number)
+            started.send_signal(chosen)
+            _, said = started.communicate(timeout=60)
+        # Python's own handlers end the process by the signal itself: to a shell the same codes.
+        assert started.returncode in (128 + chosen, -chosen), (number, started.returncode, said)
+        assert len(said.splitlines()) <= 1, said.decode()
+        assert b"Traceback" not in said, said.decode()
+
+
+@row(
     "`kill -9` of one of a training's two processes, and of all again and again",
     "noticed at once, its trials are played again and give the same, a line says so; the second"
     " ends in a line",

@@ -6,7 +6,6 @@ match; only /clock stays where it is.
 
 import re
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,6 +28,7 @@ from keepaway_sim.bags.playback import Playback, difference_from_installed, epis
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
+from keepaway_sim.cli.interrupts import SIGNALS, Stopped
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.subscribing import message_class, to_profile
@@ -231,20 +231,21 @@ def _range(text: str) -> tuple[int, int]:
 
 @contextmanager
 def stoppable(executor: Any) -> Iterator[Callable[[float], None]]:
-    """Lets ROS spin until SIGINT or SIGTERM comes; then the next spin is a KeyboardInterrupt.
+    """Lets ROS spin until a signal asks the program to end; then the next spin raises `Stopped`.
 
     Before the block SIGTERM simply ends the process: nothing has begun that must be ended.
     """
-    stop = threading.Event()
+    came: list[int] = []
 
     def spin(seconds: float) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
+        if came:
+            raise Stopped(came[0])
         executor.spin_once(timeout_sec=seconds)
 
     before = [
-        (number, signal.signal(number, lambda *_: stop.set()))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        (number, signal.signal(number, lambda signum, _: came.append(signum)))
+        for number in SIGNALS
+        if signal.getsignal(number) is not signal.SIG_IGN  # nohup stays nohup
     ]
     try:
         yield spin
@@ -257,7 +258,7 @@ def main(args: list[str] | None = None) -> int:
     """Play a bag.
 
     Returns:
-        0, or 2 where it cannot be played.
+        0, or 2 where it cannot be played; after a signal what shells expect, 143 after SIGTERM.
     """
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -271,7 +272,11 @@ def main(args: list[str] | None = None) -> int:
     except (KeepawayError, InvalidParameterTypeException) as error:
         get_logger("replayer").error(str(error))
         return 2
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except Stopped as stopped:
+        return stopped.code
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    except ExternalShutdownException:
         pass
     finally:
         rclpy.try_shutdown()
