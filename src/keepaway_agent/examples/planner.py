@@ -9,11 +9,13 @@ the true state of the world, which no player knows: it is a mark to aim at, not 
 """
 
 import argparse
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from figures import keep
+from intervals import bootstrap
 
 from keepaway_agent.environments.gym import KeeperEnv, KeeperVectorEnv
 
@@ -58,20 +60,19 @@ class Planner:
             return 0
         luck = self._rng.integers(2**63, size=self._args.rollouts).tolist()  # the same for each
         states = [env.get_state()] * len(self._first)
-        self._fields.set_state(states, luck * self._num_keepers)
-        lasted = self._play_out().reshape(self._num_keepers, -1).mean(axis=1)
-        return int(lasted.argmax())
+        _, infos = self._fields.set_state(states, luck * self._num_keepers)
+        ends = self._play_out(infos["cycle"] + self._args.horizon)
+        return int(ends.reshape(self._num_keepers, -1).mean(axis=1).argmax())
 
-    def _play_out(self) -> np.ndarray:
-        """(num_fields,) cycles that the ball stays in play, up to the horizon."""
-        lasted, alive = np.zeros(len(self._first)), np.ones(len(self._first), dtype=np.bool_)
-        actions = self._first
-        for _ in range(self._args.horizon):
-            observations, _, ended, _, _ = self._fields.step(actions)
-            lasted += alive
-            alive &= ~ended
+    def _play_out(self, horizon: np.ndarray) -> np.ndarray:
+        """(num_fields,) cycles at which the ball went out of play, those of `horizon` at most."""
+        ends, alive, actions = horizon.copy(), np.ones(len(horizon), dtype=np.bool_), self._first
+        while alive.any():
+            observations, _, ended, _, infos = self._fields.step(actions)
+            ends[alive & ended] = np.minimum(infos["cycle"], horizon)[alive & ended]
+            alive &= ~ended & (infos["cycle"] < horizon)
             actions = hand_coded(observations, self._num_keepers)
-        return lasted
+        return ends
 
 
 def play(args: Args, planned: bool) -> np.ndarray:
@@ -90,13 +91,6 @@ def play(args: Args, planned: bool) -> np.ndarray:
     return np.array(durations)
 
 
-def interval(durations: np.ndarray) -> tuple[float, float]:
-    """A 95 % interval of the mean, by bootstrap."""
-    picked = np.random.default_rng(0).integers(len(durations), size=(10_000, len(durations)))
-    low, high = np.percentile(durations[picked].mean(axis=1), [2.5, 97.5])
-    return float(low), float(high)
-
-
 def draw(results: dict[str, np.ndarray], args: Args, path: Path) -> None:
     """How many episodes last how long."""
     mpl.use("Agg")
@@ -104,7 +98,7 @@ def draw(results: dict[str, np.ndarray], args: Args, path: Path) -> None:
 
     figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
     for name, durations in results.items():
-        low, high = interval(durations)
+        low, high = bootstrap(durations)
         ends = np.concatenate([[0.0], np.sort(durations)])
         share = 1 - np.arange(len(ends)) / len(durations)
         axes.step(
@@ -137,9 +131,9 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     results = {"hand-coded": play(args, planned=False), "planned": play(args, planned=True)}
     for name, durations in results.items():
-        low, high = interval(durations)
+        low, high = bootstrap(durations)
         print(f"{name}: {durations.mean():.1f} s (95 %: {low:.1f} to {high:.1f})")
-    np.savez(out / "durations.npz", **results)  # type: ignore[arg-type]
+    keep(out, "planner", settings=asdict(args), durations=results)
     draw(results, args, out / "planner.png")
     print(f"drew {out / 'planner.png'}")
 

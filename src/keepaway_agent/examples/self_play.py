@@ -3,22 +3,29 @@
     .venv/bin/python src/keepaway_agent/examples/self_play.py --hours 4
 
 All keepers share one network and all takers another; each learns from its own choices, while the
-other team learns too. Afterwards each team plays against the hand-coded one and against the other.
+other team learns too. Afterwards each team plays against the hand-coded one and against the other,
+beside two hand-coded teams on the same seeds.
 """
 
 import argparse
-from dataclasses import dataclass, fields
+import math
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from figures import keep
+from intervals import bootstrap
+from planner import Args as HandCoded
+from planner import play
 from small_network import QNetworks
 
 from keepaway_agent.environments import KeepawayAECEnv, keepaway_v0
 
 CYCLES_PER_HOUR = 36_000
 SECONDS_PER_CYCLE = 0.1
+FIRST_SEED = 10_000  # of the episodes afterwards
 ALL = np.ones(1, dtype=np.bool_)
 
 
@@ -103,7 +110,7 @@ def evaluate(args: Args, teams: dict[str, Team]) -> np.ndarray:
     env = keepaway_v0.turn_based_env(teams=who, task=args.task)
     durations = []
     for episode in range(args.episodes):
-        env.reset(seed=10_000 + episode)
+        env.reset(seed=FIRST_SEED + episode)
         cycle = 0
         for agent in env.agent_iter():
             seen, _, terminated, _, info = env.last()
@@ -114,19 +121,12 @@ def evaluate(args: Args, teams: dict[str, Team]) -> np.ndarray:
     return np.array(durations)
 
 
-def interval(durations: np.ndarray) -> tuple[float, float]:
-    """A 95 % interval of the mean, by bootstrap."""
-    picked = np.random.default_rng(0).integers(len(durations), size=(10_000, len(durations)))
-    low, high = np.percentile(durations[picked].mean(axis=1), [2.5, 97.5])
-    return float(low), float(high)
-
-
 def draw(durations: np.ndarray, pairs: dict[str, np.ndarray], args: Args, path: Path) -> None:
     """Durations as both teams learn, and what each has learned."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
     hours = np.cumsum(durations) / CYCLES_PER_HOUR
     parts = np.minimum((hours / args.hours * 20).astype(int), 19)
     means = [SECONDS_PER_CYCLE * durations[parts == k].mean() for k in range(20)]
@@ -134,10 +134,11 @@ def draw(durations: np.ndarray, pairs: dict[str, np.ndarray], args: Args, path: 
     left.set(xlabel="simulated hours of self-play", ylabel="episode duration (s)", ylim=(0, None))
     left.set_title(f"{args.task}: both teams learn")
     for place, each in enumerate(pairs.values()):
-        low, high = interval(each)
+        low, high = bootstrap(each)
         right.errorbar([place], [each.mean()], [[each.mean() - low], [high - each.mean()]], fmt="o")
     right.set_xticks(range(len(pairs)), [name.replace(" v ", "\nv ") for name in pairs])
-    right.set(ylim=(0, None), title=f"afterwards, {args.episodes} episodes each; 95 % intervals")
+    right.set(xlim=(-0.6, len(pairs) - 0.4), ylim=(0, None), ylabel="episode duration (s)")
+    right.set_title(f"afterwards, {args.episodes} episodes each; 95 % intervals")
     left.grid(alpha=0.3)
     right.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
@@ -154,15 +155,17 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     teams, durations = learn(args)
     print(f"learned in {len(durations):,} episodes")
+    rules = HandCoded(args.task, args.episodes, longest=math.inf, seed=FIRST_SEED)
     pairs = {
+        "hand-coded keepers v hand-coded takers": play(rules, planned=False),
         "learned keepers v hand-coded takers": evaluate(args, {"keeper": teams["keeper"]}),
         "learned keepers v learned takers": evaluate(args, teams),
         "hand-coded keepers v learned takers": evaluate(args, {"taker": teams["taker"]}),
     }
     for name, each in pairs.items():
-        low, high = interval(each)
+        low, high = bootstrap(each)
         print(f"{name}: {each.mean():.1f} s (95 %: {low:.1f} to {high:.1f})")
-    np.savez(out / "durations.npz", learning=durations, **pairs)  # type: ignore[arg-type]
+    keep(out, "self_play", settings=asdict(args), durations=pairs, episodes=len(durations))
     draw(durations, pairs, args, out / "self_play.png")
     print(f"drew {out / 'self_play.png'}")
 

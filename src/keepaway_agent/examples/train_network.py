@@ -10,12 +10,13 @@ cycles (a semi-Markov problem), so what comes after a choice counts `gamma ** cy
 
 import argparse
 import time
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from scipy import stats
+from figures import keep
+from intervals import half_width
 from small_network import QNetworks
 
 from keepaway_agent.environments.gym import KeeperVectorEnv
@@ -96,18 +97,9 @@ def curve(durations: Durations, hours: float, num_points: int = 20) -> np.ndarra
     for each in durations:
         ends = np.cumsum(each) / CYCLES_PER_HOUR
         part = np.minimum((ends / hours * num_points).astype(int), num_points)
-        means = [each[part == k].mean() for k in range(num_points)]
-        curves.append(SECONDS_PER_CYCLE * np.array(means))
+        sums, counts = (np.bincount(part, w, num_points + 1)[:-1] for w in (each, None))
+        curves.append(SECONDS_PER_CYCLE * sums / np.where(counts, counts, np.nan))
     return np.array(curves)
-
-
-def half_width(values: np.ndarray) -> np.ndarray:
-    """Half of a 95 % interval of the mean over the first axis (Student's t)."""
-    num_trials = len(values)
-    if num_trials < 2:
-        return np.zeros(values.shape[1:])
-    sem = values.std(axis=0, ddof=1) / np.sqrt(num_trials)
-    return np.asarray(stats.t.ppf(0.975, num_trials - 1) * sem)
 
 
 def draw(curves: dict[str, np.ndarray], args: Args, path: Path) -> None:
@@ -162,6 +154,7 @@ def main() -> None:
         np.save(out / f"{each}.npy", values)
     kept = {each: out / f"{each}.npy" for each in LEARNERS}  # of this run, or of earlier ones
     curves = {LEARNERS[each][0]: np.load(path) for each, path in kept.items() if path.exists()}
+    keep(out, "learners", settings=asdict(args), curves=curves)
     draw(curves, args, out / "learning_curves.png")
     print(f"drew {out / 'learning_curves.png'}")
 
