@@ -83,7 +83,7 @@ def _write_page(folder: Path, page: Path) -> int:
     figures = page.with_suffix("")
     figures.mkdir(parents=True, exist_ok=True)
     for name, figure in page_figures(studies).items():
-        plotting.save(figure, figures / f"{name}.png", "scripts/analyze.py --page")
+        plotting.save_figure(figure, figures / f"{name}.png", "scripts/analyze.py --page")
     page.write_text(page_of(studies), encoding="utf-8")
     print(f"Written: the reports of {', '.join(studies)}, {page} and {figures}.")
     return 0

@@ -274,7 +274,7 @@ def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
     title = f"4v3, mean of 200 episodes, {args.trials} trials"
     figure = plotting.learning_curves(hours, curves, THRESHOLD, title)
     path = args.out / "learning_curves.png"
-    plotting.save(figure, path, f"scripts/demo.py --seed {args.seed}, {code_version()}")
+    plotting.save_figure(figure, path, f"scripts/demo.py --seed {args.seed}, {code_version()}")
     return path
 
 

@@ -25,7 +25,7 @@ from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.nodes.spectator import POLL_PERIOD, Spectator
+from keepaway_sim.nodes.spectator import DRAIN_PERIOD, Spectator
 from keepaway_sim.view.page import replay_page
 from keepaway_sim.view.picture import picture
 from keepaway_sim.view.server import Server
@@ -72,7 +72,7 @@ def watch(host: str, port: int, ros: list[str]) -> int:
             print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
             while True:
                 spectator.poll()
-                time.sleep(POLL_PERIOD)
+                time.sleep(DRAIN_PERIOD)
     except Stopped as stopped:
         return stopped.code
     finally:

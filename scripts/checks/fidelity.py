@@ -56,7 +56,7 @@ def main() -> int:
         save(draw_band(np.array(part["learned"]["curves_s"])), name, "scripts/checks/fidelity.py")
         return write_page(arguments.page, part)
     if arguments.learning:
-        profiles = [name for name in reference.PROFILES if any(c.profile == name for c in cells)]
+        profiles = [name for name in reference.SESSIONS if any(c.profile == name for c in cells)]
         curves = learn(profiles, arguments.seeds, arguments.workers)
         text, numbers, figure, name = learning_report(curves)
     else:
@@ -88,8 +88,8 @@ def learned_numbers(trials: int, short: bool) -> dict[str, Any]:
     total, begins = (400, (0, 200)) if short else (5400, (0, 2800, 5200))
     config = LearnerConfig(ordering="k1", tile_widths="framework")
     trained = Training(task="3v2", learner=config, episodes=total, seed=measure.SEED)
-    durations, stages = learned.learn_in_stages(trained, trials, begins, measure.BLOCK)
-    blocks = durations.reshape(trials, -1, measure.BLOCK).mean(axis=2)
+    durations, stages = learned.learn_in_stages(trained, trials, begins, measure.POINT)
+    blocks = durations.reshape(trials, -1, measure.POINT).mean(axis=2)
     return {
         "curves_s": blocks.round(3).tolist(),
         "stages": [
@@ -241,7 +241,7 @@ def learning_report(curves: dict[str, np.ndarray]) -> tuple[str, dict[str, Any],
             theirs = [f"{value:.1f}" for value in curve]
             rows.append([profile, "real server", *theirs, *[""] * (len(mean) - len(theirs))])
     blocks = " | ".join(
-        str(number) for number in range(measure.BLOCK, LEARNING_EPISODES + 1, measure.BLOCK)
+        str(number) for number in range(measure.POINT, LEARNING_EPISODES + 1, measure.POINT)
     )
     text = table(f"| profile | mean duration (s) until episode | {blocks} |", rows)
     return text, {"learning": numbers}, draw_learning(curves), "learning.png"

@@ -1,4 +1,9 @@
-"""The one family of errors this package raises for bad input."""
+"""The one family of errors this package raises for bad input, and how often trouble is logged."""
+
+from typing import Final
+
+LOG_PERIOD: Final = 5.0
+"""Seconds in which the same warning is logged once."""
 
 
 class KeepawayError(ValueError):

@@ -52,7 +52,7 @@ from keepaway_transfer.errors import MappingError
 PARTS = ("level", "shape", "preferences")
 STATES_FILE = Path(__file__).with_name("reference_states.npz")
 
-Weights = NDArray[np.float64]
+WeightsArray = NDArray[np.float64]
 Sample = NDArray[np.int64]  # (num_states, num_features), the fine cells of the sample's states
 
 
@@ -60,8 +60,8 @@ class Split(NamedTuple):
     """The three parts of some weights; by broadcasting they add up to them."""
 
     level: float
-    shape: Weights  # (1, num_features, num_tiles, num_tilings)
-    preferences: Weights  # (num_actions, num_features, num_tiles, num_tilings)
+    shape: WeightsArray  # (1, num_features, num_tiles, num_tilings)
+    preferences: WeightsArray  # (num_actions, num_features, num_tiles, num_tilings)
 
 
 @cache
@@ -89,7 +89,7 @@ def has_sample(task: str) -> bool:
         return task in drawn
 
 
-def split(weights: Weights, sample: Sample) -> Split:
+def split(weights: WeightsArray, sample: Sample) -> Split:
     """The three parts of weights, (num_actions, num_features, num_tiles, num_tilings)."""
     level = _mean_weight(weights, sample)
     over_actions = weights.mean(axis=0, keepdims=True)
@@ -97,8 +97,8 @@ def split(weights: Weights, sample: Sample) -> Split:
 
 
 def kept(
-    weights: Weights, sample: Sample, parts: Collection[str], level: float | None = None
-) -> Weights:
+    weights: WeightsArray, sample: Sample, parts: Collection[str], level: float | None = None
+) -> WeightsArray:
     """The weights with some of their parts only.
 
     Args:
@@ -121,7 +121,7 @@ def kept(
     return result
 
 
-def scaled(weights: Weights, sample: Sample, level: float) -> Weights:
+def scaled(weights: WeightsArray, sample: Sample, level: float) -> WeightsArray:
     """The weights times the number that brings their level to this one [s].
 
     Weights without a level of their own become constant.
@@ -130,7 +130,7 @@ def scaled(weights: Weights, sample: Sample, level: float) -> Weights:
     return weights * (asked / own) if own else np.full(weights.shape, asked)
 
 
-def level_of(weights: Weights, sample: Sample) -> float:
+def level_of(weights: WeightsArray, sample: Sample) -> float:
     """What an action is worth on average [s]: the value that the level alone gives it."""
     return float(_mean_weight(weights, sample) * NUM_TILINGS * weights.shape[1] * CYCLE_TIME)
 
@@ -140,7 +140,7 @@ def weight_of(level: float, num_features: int) -> float:
     return level / CYCLE_TIME / (NUM_TILINGS * num_features)
 
 
-def _mean_weight(weights: Weights, sample: Sample) -> float:
+def _mean_weight(weights: WeightsArray, sample: Sample) -> float:
     """The mean weight of all tiles that are active in the sample."""
     flat = weights.mean(axis=0).reshape(weights.shape[1], -1)
     sums = np.pad(np.cumsum(flat, axis=1), ((0, 0), (1, 0)))

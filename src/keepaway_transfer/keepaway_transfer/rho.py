@@ -20,10 +20,8 @@ from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import MappingError
 from keepaway_transfer.mapping import MAPPING_RULES, InterTaskMapping, actions, state_variables
-from keepaway_transfer.parts import sample_of
+from keepaway_transfer.parts import WeightsArray, sample_of
 from keepaway_transfer.variants import RHO, Variant, variant_of
-
-Weights = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -94,12 +92,12 @@ def transferred(source: LearnedWeights, transfer: Transfer) -> LearnedWeights:
 
 
 def rho(
-    weights: Weights,
+    weights: WeightsArray,
     source: Tiling,
     target: Tiling,
     mapping: InterTaskMapping,
     variant: Variant = RHO,
-) -> Weights:
+) -> WeightsArray:
     """Weights for the target task from those of a keeper of the source task.
 
     Args:
@@ -166,7 +164,7 @@ def _profile(source: LearnedWeights) -> str:
 
 
 def _check_tasks(
-    weights: Weights, source: Tiling, target: Tiling, mapping: InterTaskMapping
+    weights: WeightsArray, source: Tiling, target: Tiling, mapping: InterTaskMapping
 ) -> None:
     expected = source.weights_shape(len(actions(mapping.source)))
     if weights.shape != expected:

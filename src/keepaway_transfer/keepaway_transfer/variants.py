@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from keepaway_transfer.errors import MappingError
-from keepaway_transfer.parts import PARTS, Sample, Weights, kept, scaled, weight_of
+from keepaway_transfer.parts import PARTS, Sample, WeightsArray, kept, scaled, weight_of
 
 LEVEL_SIGN = "@"
 
@@ -40,7 +40,9 @@ class Variant:
         """Is a level to be found in the copied weights?"""
         return self.scaled or self.parts != PARTS or self.level is not None
 
-    def changed(self, carried: Weights, scale: float, sample: Callable[[], Sample]) -> Weights:
+    def changed(
+        self, carried: WeightsArray, scale: float, sample: Callable[[], Sample]
+    ) -> WeightsArray:
         """What becomes of copied weights.
 
         Args:
@@ -63,7 +65,7 @@ class Variant:
         return kept(carried, sample(), self.parts, self.level)
 
 
-def constant(level: float, shape: tuple[int, int, int, int]) -> Weights:
+def constant(level: float, shape: tuple[int, int, int, int]) -> WeightsArray:
     """Weights that value every action of every state at this level [s]."""
     return np.full(shape, weight_of(level, shape[1]))
 

@@ -9,10 +9,10 @@ import pytest
 from gymnasium.utils.save_video import save_video
 from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo
 
-from keepaway_agent.actions import Role
 from keepaway_agent.environments import KeepawayParallelEnv, KeeperEnv, KeeperVectorEnv
-from keepaway_agent.environments.pictures import MARGIN, TEAM, Painter
-from keepaway_sim.task import Task
+from keepaway_agent.environments.pictures import MARGIN, Painter
+from keepaway_sim.task import Role, Task
+from keepaway_sim.view.palette import TEAM_COLOURS
 
 
 def rgb(colour: str) -> tuple[int, ...]:
@@ -39,7 +39,7 @@ def test_everybody_is_drawn_in_the_teams_colour_where_the_truth_is(task: Task) -
     places = env.state()[: 4 * (task.num_players + 1)].reshape(-1, 4)[:, :2]
     for player in range(task.num_players):
         around = places[player] + 0.17 * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
-        wanted = rgb(TEAM[Role(task.role(player))])
+        wanted = rgb(TEAM_COLOURS[task.role(player)])
         pixels = [pixel_at(frame, point, task).astype(int) for point in around]
         assert any(np.abs(pixel - wanted).max() < 30 for pixel in pixels), player
     assert (pixel_at(frame, places[-1], task) > 240).all()
@@ -47,8 +47,8 @@ def test_everybody_is_drawn_in_the_teams_colour_where_the_truth_is(task: Task) -
 
 def test_colours_are_those_of_the_page(root: Path) -> None:
     page = (root / "src/keepaway_sim/keepaway_sim/view/web/page.css").read_text()
-    assert f"--keeper: {TEAM[Role.KEEPER]}" in page
-    assert f"--taker: {TEAM[Role.TAKER]}" in page
+    assert f"--keeper: {TEAM_COLOURS[Role.KEEPER]}" in page
+    assert f"--taker: {TEAM_COLOURS[Role.TAKER]}" in page
 
 
 def test_a_list_of_frames_has_every_cycle_once() -> None:

@@ -35,7 +35,7 @@ PLAYED = held(
 
 
 def test_behaviour_is_counted_by_passes():
-    found = learned.behaviour(learned.Stage(0, np.array([3.0, 1.0]), PLAYED))
+    found = learned.behaviour(learned.LearnedStage(0, np.array([3.0, 1.0]), PLAYED))
     assert found == pytest.approx(
         {
             "mean_s": 2.0,

@@ -5,7 +5,7 @@ import numpy as np
 from keepaway_agent.fidelity.reference import (
     GOALS,
     GOALS_NARROW,
-    PROFILES,
+    SESSIONS,
     Cell,
     reference,
     reference_cells,
@@ -18,7 +18,7 @@ def test_every_number_of_the_file_is_in_a_cell():
     cells = {(c.profile, c.visible_angle, c.task, c.policy): c for c in reference_cells()}
     times = reference("hold_times")
     counted = 0
-    for profile, name in PROFILES.items():
+    for profile, name in SESSIONS.items():
         for view, tasks in times[name].items():
             if not view.startswith("visible_angle_"):
                 continue
@@ -36,7 +36,7 @@ def test_a_narrow_view_has_a_goal_of_its_own():
 
 
 def test_learning_curves_are_blocks_of_durations():
-    for profile in PROFILES:
+    for profile in SESSIONS:
         curves = reference_curves(profile)
         assert curves
         for curve in curves:

@@ -84,7 +84,7 @@ def test_untrained_weights_prefer_nothing():
 @pytest.mark.parametrize("role", list(Role))
 @pytest.mark.parametrize("num_keepers", [2, 3, 9])
 def test_every_state_variable_and_action_is_drawn(role, num_keepers, monkeypatch):
-    monkeypatch.setattr("keepaway_agent.learning.describe.GRID", 7)
+    monkeypatch.setattr("keepaway_agent.learning.describe.PLACES", 7)
     weights = make_weights(num_keepers, num_keepers - 1, role)
     panels = [axes for axes in draw_values(weights).axes if axes.axison]
     assert len(panels) == weights.tiling.num_features

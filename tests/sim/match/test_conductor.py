@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.beginning import begin_match
-from keepaway_sim.match.conductor import LOG_PERIOD, Conductor
+from keepaway_sim.match.conductor import Conductor
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.wire import messages

@@ -15,7 +15,7 @@ from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Outcome, Task
 from keepaway_sim.view.page import (
-    NONE,
+    NO_VALUE,
     chosen_episodes,
     frames,
     layout,
@@ -71,11 +71,11 @@ def test_frames_are_the_track_to_a_centimetre(track: Track, bag: MatchBag) -> No
     believed = part(rows, "believed", bag.task).reshape(count, 5, 6, 2)
     known = track.age < 65535
     np.testing.assert_allclose(believed[known] / 100, track.believed[known], atol=0.00501)
-    assert (believed[~known] == NONE).all()
+    assert (believed[~known] == NO_VALUE).all()
     np.testing.assert_allclose(part(rows, "yaw", bag.task) / 1e4, track.yaw, atol=0.0001)
     np.testing.assert_array_equal(part(rows, "requested", bag.task), track.requested)
     values = part(rows, "values", bag.task).reshape(count, 5, 3)
-    expected = np.where(np.isnan(track.values), NONE, np.rint(10 * track.values))
+    expected = np.where(np.isnan(track.values), NO_VALUE, np.rint(10 * track.values))
     np.testing.assert_array_equal(values, expected)
 
 

@@ -32,7 +32,7 @@ def test_learning_curves_draw_each_trial_and_the_mean(curve_figure):
 
 def test_a_figure_is_written_with_what_made_it(curve_figure, tmp_path):
     path = tmp_path / "figure.png"
-    plotting.save(curve_figure, path, "study tiny, seed 7")
+    plotting.save_figure(curve_figure, path, "study tiny, seed 7")
     assert imread(path).shape == (690, 1080, 4)
     assert b"study tiny, seed 7" in path.read_bytes()
 
@@ -40,7 +40,7 @@ def test_a_figure_is_written_with_what_made_it(curve_figure, tmp_path):
 def test_time_to_threshold_draws_an_estimate_a_row():
     target = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
     total = [statistics.Interval(8, 7, 9), statistics.Interval(7, 6, 8)]
-    figure = plotting.time_to_threshold(
+    figure = plotting.time_to_threshold_figure(
         ["0", "1,000"], target, total, target[0], title="4v3", rows_are="Episodes of 3v2"
     )
     estimates = [y.tolist() for x, y in lines(figure) if len(x) == 2]
@@ -72,7 +72,7 @@ def test_where_all_trials_have_reached_it_the_axis_ends_soon_after():
 def test_only_rows_with_an_order_are_connected():
     times = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
     for connected, style in ((True, "-"), (False, "None")):
-        figure = plotting.time_to_threshold(
+        figure = plotting.time_to_threshold_figure(
             ["a", "b"], times, times, times[0], title="4v3", rows_are="Way", connected=connected
         )
         (axes,) = figure.axes

@@ -10,7 +10,7 @@ from scipy import stats
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.reports.report import write_report
 from keepaway_transfer.reports.summary import measure_trials, summarise
-from keepaway_transfer.studies.results import Results, SourceRun, StudyTrial, record_of
+from keepaway_transfer.studies.results import SourceRun, StudyResults, StudyTrial, record_of
 from keepaway_transfer.studies.study import Row, Stage, Study
 
 HOUR = 36_000  # [cycles]
@@ -37,7 +37,7 @@ def trial(row, number, hours, *, reaches=True, source_hours=0.0):
 
 def results(*trials, study=STUDY):
     records = tuple(record_of(one, study) for one in trials)
-    return Results(study, "scripts/study.py worked", "v1", records)
+    return StudyResults(study, "scripts/study.py worked", "v1", records)
 
 
 def differences(study, first, second):

@@ -15,7 +15,7 @@ from keepaway_transfer.reports.evidence import (
 from keepaway_transfer.reports.page import page
 from keepaway_transfer.reports.page_figures import page_figures
 from keepaway_transfer.studies.records import Record
-from keepaway_transfer.studies.results import Results
+from keepaway_transfer.studies.results import StudyResults
 from keepaway_transfer.studies.study import load_study
 
 HOURS = {"0": 30.0, "0 s": 30.0, "2 s": 21.0, "5 s": 18.0, "8 s": 20.0, "12 s": 26.0, "20 s": 58.0}
@@ -31,7 +31,7 @@ def record(row, number, target, source=0.0, initial=5.0):
 
 
 def study_of(name, mean_of, trials=12, shift=0.0):
-    """Results in which trials lie one hour apart around their row's mean."""
+    """StudyResults in which trials lie one hour apart around their row's mean."""
     study = load_study(name)
     spread = np.arange(trials) - (trials - 1) / 2 + shift
     records = [
@@ -39,7 +39,7 @@ def study_of(name, mean_of, trials=12, shift=0.0):
         for row in study.rows
         for k in range(trials)
     ]
-    return Evidence(Results(study, f"scripts/study.py {name}", "v1", tuple(records)))
+    return Evidence(StudyResults(study, f"scripts/study.py {name}", "v1", tuple(records)))
 
 
 def table(name, best):

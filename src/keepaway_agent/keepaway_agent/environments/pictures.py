@@ -8,16 +8,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from keepaway_agent.actions import Action, Outcome, Role
+from keepaway_agent.actions import Action, Outcome
 from keepaway_sim.task import Task
+from keepaway_sim.view.palette import BALL, CHALK, GRASS, GRASS_LIGHT, INK, TEAM_COLOURS
 from keepaway_sim.world.world import World
-
-GRASS: Final = "#2c6e49"
-GRASS_LIGHT: Final = "#34794f"
-CHALK: Final = "#e9f3ec"
-INK: Final = "#10201a"
-BALL: Final = "#ffffff"
-TEAM: Final = {Role.KEEPER: "#56b4e9", Role.TAKER: "#ff9e4a"}
 
 LONG_SIDE: Final = 480
 """Pixels along the longer side of a frame."""
@@ -167,7 +161,7 @@ class Painter:
         pen.text(at, text, "#ffffff", self._font, "mt", stroke_width=rim, stroke_fill=GRASS)
 
     def _colour(self, player: int) -> str:
-        return TEAM[Role.KEEPER if player < self._task.num_keepers else Role.TAKER]
+        return TEAM_COLOURS[self._task.role(player)]
 
 
 def _caption(moment: Moment) -> str:

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from keepaway_agent.fidelity.measure import BLOCK, Measured
+from keepaway_agent.fidelity.measure import POINT, Measured
 from keepaway_agent.fidelity.reference import reference_curves, reference_processes
 from keepaway_sim.world.config import CYCLE_TIME
 
-COLOURS: Final = {"random": "#0072b2", "hold": "#d55e00", "hand": "#009e73"}
+POLICY_COLOURS: Final = {"random": "#0072b2", "hold": "#d55e00", "hand": "#009e73"}
 """Okabe and Ito's, which colour-blind people can tell apart."""
 COLUMNS: Final = 3
 OURS, REFERENCE = "#0072b2", "#d55e00"
@@ -57,7 +57,7 @@ def _panel_title(measured: Measured) -> str:
 
 
 def _draw_cell(axes: Axes, measured: Measured) -> None:
-    colour = COLOURS[measured.cell.policy]
+    colour = POLICY_COLOURS[measured.cell.policy]
     _draw_survival(axes, measured.duration, color=colour, linewidth=1.4)
     recorded = reference_processes(measured.cell)
     if recorded:
@@ -75,7 +75,9 @@ def _draw_survival(axes: Axes, durations: np.ndarray, **style: Any) -> None:
 
 
 def _legend() -> list[Line2D]:
-    lines = [Line2D([], [], color=colour, label=policy) for policy, colour in COLOURS.items()]
+    lines = [
+        Line2D([], [], color=colour, label=policy) for policy, colour in POLICY_COLOURS.items()
+    ]
     marks: dict[str, dict[str, Any]] = {
         "here": {"linestyle": "-"},
         "real server (recorded)": {"linestyle": ":"},
@@ -95,20 +97,20 @@ def draw_learning(curves: Mapping[str, np.ndarray]) -> Figure:
     figure = Figure(figsize=(4.2 * len(curves), 3.2), layout="constrained")
     panels = figure.subplots(1, len(curves), squeeze=False, sharey=True)[0]
     for axes, (profile, ours) in zip(panels, curves.items(), strict=True):
-        episodes = BLOCK * (np.arange(ours.shape[1]) + 1)
+        episodes = POINT * (np.arange(ours.shape[1]) + 1)
         axes.plot(episodes, ours.T, color=OURS, linewidth=0.7, alpha=0.45)
         label = f"here, mean of {len(ours)} seeds"
         axes.plot(episodes, ours.mean(axis=0), color=OURS, linewidth=2.2, label=label)
         for number, theirs in enumerate(reference_curves(profile)):
             axes.plot(
-                BLOCK * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,
+                POINT * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,
                 linewidth=1.4, label="" if number else "real server, single runs",
             )  # fmt: skip
         axes.set_title(f"3v2 from scratch, profile {profile}", fontsize=9)
         axes.set_xlabel("episodes", fontsize=8)
         axes.tick_params(labelsize=8)
         axes.legend(frameon=False, fontsize=8, loc="upper left")
-    panels[0].set_ylabel(f"mean duration of {BLOCK} episodes (s)", fontsize=8)
+    panels[0].set_ylabel(f"mean duration of {POINT} episodes (s)", fontsize=8)
     panels[0].set_ylim(bottom=0)
     return figure
 
@@ -121,17 +123,17 @@ def draw_band(ours: np.ndarray) -> Figure:
     """
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     axes = figure.subplots()
-    episodes = BLOCK * (np.arange(ours.shape[1]) + 1)
+    episodes = POINT * (np.arange(ours.shape[1]) + 1)
     mean, spread = ours.mean(axis=0), 2.0 * ours.std(axis=0, ddof=1)
     axes.fill_between(episodes, mean - spread, mean + spread, color=OURS, alpha=0.2, linewidth=0)
     axes.plot(episodes, mean, color=OURS, linewidth=2.2, label=f"here, {len(ours)} trials")
     for number, theirs in enumerate(reference_curves("2005")):
         axes.plot(
-            BLOCK * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,
+            POINT * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,
             linewidth=1.2, label="" if number else "real server, single runs",
         )  # fmt: skip
     axes.set_xlabel("episodes", fontsize=8)
-    axes.set_ylabel(f"mean duration of {BLOCK} episodes (s)", fontsize=8)
+    axes.set_ylabel(f"mean duration of {POINT} episodes (s)", fontsize=8)
     axes.set_ylim(bottom=0)
     axes.tick_params(labelsize=8)
     axes.legend(frameon=False, fontsize=8, loc="upper left")

@@ -37,7 +37,7 @@ class Held(NamedTuple):
     true: np.ndarray  # (num_rows, 1 + num_takers) [m] the same in truth
 
 
-class Stage(NamedTuple):
+class LearnedStage(NamedTuple):
     """Play from one stage of learning on."""
 
     begin: int  # episodes learned before
@@ -83,7 +83,7 @@ def _distances(position: np.ndarray, keeper: int, num_keepers: int) -> np.ndarra
 
 def learn_in_stages(
     training: Training, num_trials: int, begins: Sequence[int], episodes: int
-) -> tuple[np.ndarray, list[Stage]]:
+) -> tuple[np.ndarray, list[LearnedStage]]:
     """Let keepers learn, and play on from their weights at each stage.
 
     Args:
@@ -105,7 +105,9 @@ def learn_in_stages(
     return np.stack([result.durations for result in results]) * CYCLE_TIME, stages
 
 
-def _play_on(trainer: Trainer, results: Sequence[TrialResult], begin: int, episodes: int) -> Stage:
+def _play_on(
+    trainer: Trainer, results: Sequence[TrialResult], begin: int, episodes: int
+) -> LearnedStage:
     """A stage: every trial goes on from its weights after `begin` episodes."""
     witnesses = [Witness() for _ in results]
     trials = [
@@ -125,13 +127,13 @@ def _play_on(trainer: Trainer, results: Sequence[TrialResult], begin: int, episo
         for number, witness in enumerate(witnesses)
     ]
     held = Held(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-    return Stage(begin, np.concatenate([one.durations for one in played]) * CYCLE_TIME, held)
+    return LearnedStage(begin, np.concatenate([one.durations for one in played]) * CYCLE_TIME, held)
 
 
 _STAGE: Final = 2  # first entry of a stage's spawn key, beside the world's 0 and the policies' 1
 
 
-def behaviour(stage: Stage) -> dict[str, float]:
+def behaviour(stage: LearnedStage) -> dict[str, float]:
     """What keepers do with the ball: the reference's columns.
 
     A pass is a run of cycles in which one keeper passes: one, or more where it sets up the ball.

@@ -25,7 +25,8 @@ from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.world import World
 
-BLOCK: Final = 200  # episodes of which a learning curve's point is the mean
+POINT: Final = 200
+"""Episodes of which a learning curve has the mean in one point."""
 SEED: Final = 1
 
 
@@ -140,7 +141,7 @@ def record(cell: Cell, episodes: int, num_fields: int = 64) -> Trajectories:
 def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
     """Learning curves of 3v2 from scratch, (num_trials, num_blocks).
 
-    Means of successive blocks of BLOCK episodes [s]. All trials are played side by side. The
+    Means of successive blocks of POINT episodes [s]. All trials are played side by side. The
     learner is the reference framework's: its order of players and its tile widths.
     """
     trials = Training(
@@ -151,7 +152,7 @@ def learn(profile: str, num_trials: int, episodes: int) -> np.ndarray:
     )
     durations = {r.trial.label: r.durations for r in play_trials(trials, range(num_trials))}
     played = np.stack([durations[number] for number in range(num_trials)])
-    blocks = played[:, : episodes // BLOCK * BLOCK].reshape(num_trials, -1, BLOCK)
+    blocks = played[:, : episodes // POINT * POINT].reshape(num_trials, -1, POINT)
     return np.asarray(blocks.mean(axis=2) * CYCLE_TIME)
 
 

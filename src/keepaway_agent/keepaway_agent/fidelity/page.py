@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from keepaway_agent.fidelity.measure import BLOCK
+from keepaway_agent.fidelity.measure import POINT
 from keepaway_agent.fidelity.reference import reference, reference_curves
 
 STAGES: Final = ("episodes_0_200", "episodes_2800_3000", "episodes_5285_5485")
@@ -95,14 +95,14 @@ def _learned(learned: Mapping[str, Any]) -> list[str]:
     curves = reference_curves("2005")
     rows = [
         [
-            str(BLOCK * (k + 1)),
+            str(POINT * (k + 1)),
             f"{mean[k]:.1f} ± {2 * spread[k]:.1f}",
             *(f"{curve[k]:.1f}" if k < len(curve) else "" for curve in curves),
         ]
         for k in range(len(mean))
     ]
     return [
-        f"Means of {BLOCK} episodes of 3v2 (s), {len(durations)} trials here.\n",
+        f"Means of {POINT} episodes of 3v2 (s), {len(durations)} trials here.\n",
         "![learning](learned.png)\n",
         table(header[: 2 + len(curves)], rows),
         _behaviour(learned["stages"]),

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-PROFILES: Final = {"2005": "E05", "v19": "D19"}
+SESSIONS: Final = {"2005": "E05", "v19": "D19"}
 """Our profiles, and their names in the reference."""
 
 
@@ -80,7 +80,7 @@ def reference_cells() -> list[Cell]:
             **numbers,
             second=second[task][policy]["mean"] if (name, angle) == ("E05", 360) else None,
         )
-        for profile, name in PROFILES.items()
+        for profile, name in SESSIONS.items()
         for angle in (360, 90)
         for task, policies in times[name].get(f"visible_angle_{angle}", {}).items()
         for policy, numbers in policies.items()
@@ -89,13 +89,13 @@ def reference_cells() -> list[Cell]:
 
 def reference_curves(profile: str) -> list[np.ndarray]:
     """Learning curves of the reference on 3v2: means of successive blocks of BLOCK episodes [s]."""
-    curves = reference("hold_times")[PROFILES[profile]]["learning_3v2_per_200_episodes"]
+    curves = reference("hold_times")[SESSIONS[profile]]["learning_3v2_per_200_episodes"]
     return [np.array(curve) for curve in (curves if isinstance(curves[0], list) else [curves])]
 
 
 def reference_processes(cell: Cell) -> dict[str, Any] | None:
     """`episodes`, `cycles` of each and mean `statistics` of recorded play; None: not recorded."""
-    recorded = reference("process_statistics")["recorded"].get(PROFILES[cell.profile], {})
+    recorded = reference("process_statistics")["recorded"].get(SESSIONS[cell.profile], {})
     if cell.visible_angle != 360:
         return None
     found: dict[str, Any] | None = recorded.get(cell.task, {}).get(cell.policy)

@@ -27,13 +27,13 @@ from keepaway_agent.learning.features import (
 )
 from keepaway_agent.learning.weights import LearnedWeights
 
-COLOURS: Final = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9", "#444444")
+LINE_COLOURS: Final = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9", "#444444")
 """Okabe and Ito's, which colour-blind people can tell apart; the first is the first action's."""
 TAKER_DISTANCE: Final = 5.0  # [m] of the scene's takers from the ball's holder
 TAKER_SPREAD: Final = math.radians(30.0)  # between two of them, as K1 sees them
 PALEST: Final = 0.3  # share of an action's colour where it is hardly better than the next
 UNTRAINED: Final = (0.93, 0.93, 0.93)
-GRID: Final = 61  # places along a side at which the moving taker is put
+PLACES: Final = 61  # places along a side at which the moving taker is put
 
 
 class Preferences(NamedTuple):
@@ -94,7 +94,7 @@ def draw_values(weights: LearnedWeights) -> Figure:
         low, high, width = tiling.lows[i], tiling.highs[i], tiling.widths[i]
         x = low + np.arange(added.shape[2]) * width / NUM_TILINGS
         shown = x <= high
-        for curve, colour in zip(added[:, i, shown], itertools.cycle(COLOURS), strict=False):
+        for curve, colour in zip(added[:, i, shown], itertools.cycle(LINE_COLOURS), strict=False):
             axes.plot(factor * x[shown], curve, color=colour, linewidth=1.2)
         axes.set_xlabel(f"{name} [{'deg' if _is_angle(name) else 'm'}]")
         axes.grid(alpha=0.3)
@@ -108,12 +108,15 @@ def draw_preferences(weights: LearnedWeights) -> Figure:
     figure = Figure(figsize=(11, 5.2), layout="constrained")
     field, lane = figure.subplots(1, 2)
     half_length, half_width = weights.field_length / 2, weights.field_width / 2
-    x, y = np.linspace(-half_length, half_length, GRID), np.linspace(-half_width, half_width, GRID)
+    x, y = (
+        np.linspace(-half_length, half_length, PLACES),
+        np.linspace(-half_width, half_width, PLACES),
+    )
     _draw_map(field, weights, x, y, preferences(weights, *np.meshgrid(x, y)))
     _draw_players(field, weights)
     field.set(xlabel="x [m]", ylabel="y [m]", title=f"where {_mover(weights)} stands")
     field.set_aspect("equal")
-    distances, angles = np.linspace(0.5, 15.0, GRID), np.linspace(0.0, 90.0, GRID)
+    distances, angles = np.linspace(0.5, 15.0, PLACES), np.linspace(0.0, 90.0, PLACES)
     taker_x, taker_y = _around_k1(weights, *np.meshgrid(distances, angles))
     _draw_map(lane, weights, distances, angles, preferences(weights, taker_x, taker_y))
     lane.set(
@@ -191,7 +194,7 @@ def _draw_map(
     axes: Axes, weights: LearnedWeights, x: np.ndarray, y: np.ndarray, shown: Preferences
 ) -> None:
     """Each place in the colour of its action, the paler the smaller the margin."""
-    own = itertools.islice(itertools.cycle(COLOURS), len(weights.action_names))
+    own = itertools.islice(itertools.cycle(LINE_COLOURS), len(weights.action_names))
     colours = np.array([*map(to_rgb, own), UNTRAINED])  # the last is for -1
     strong = np.quantile(shown.margin, 0.8) or 1.0
     depth = np.clip(PALEST + (1.0 - PALEST) * shown.margin / strong, 0.0, 1.0)[..., None]
@@ -213,7 +216,7 @@ def _draw_players(axes: Axes, weights: LearnedWeights) -> None:
 
 
 def _legend(figure: Figure, weights: LearnedWeights) -> None:
-    names = zip(weights.action_names, itertools.cycle(COLOURS), strict=False)
+    names = zip(weights.action_names, itertools.cycle(LINE_COLOURS), strict=False)
     handles = [Patch(color=colour, label=name) for name, colour in names]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
 

@@ -24,8 +24,8 @@ from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import TrialResult
 from keepaway_sim.version import code_version
 
-FORMAT: Final = "keepaway-training"
-FORMAT_VERSION: Final = 1
+TRAINING_FORMAT: Final = "keepaway-training"
+TRAINING_VERSION: Final = 1
 
 log = logging.getLogger(__name__)
 
@@ -55,8 +55,8 @@ class TrainingFolder:
         self.path, self._training, self._command = path, training, command
         settings = flat(training)
         self._record = {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
+            "format": TRAINING_FORMAT,
+            "format_version": TRAINING_VERSION,
             "settings": settings,
             "code_version": code_version(),
             "command": command,

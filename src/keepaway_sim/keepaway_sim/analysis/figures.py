@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from keepaway_sim.task import Action, Outcome, Task
 
-COLOURS = {Outcome.TAKEN_AWAY: "#d55e00", Outcome.OUT_OF_BOUNDS: "#8a5fb0"}
+OUTCOME_COLOURS = {Outcome.TAKEN_AWAY: "#d55e00", Outcome.OUT_OF_BOUNDS: "#8a5fb0"}
 BLUE = "#0072b2"
 ACTION_COLOURS = (BLUE, "#56b4e9", "#009e73", "#e69f00", "#cc79a7")
 WITH_BALL = (Action.HOLD_BALL, Action.PASS_BALL)
@@ -68,7 +68,7 @@ def losses_figure(losses: np.ndarray, task: Task) -> Figure:
     border = Rectangle((-length / 2, -width / 2), length, width, fill=False, edgecolor="0.3")
     axes.add_patch(border)
     every, size = max(1, len(losses) // 4000), 1.5 * _dot(len(losses))
-    for outcome, colour in COLOURS.items():
+    for outcome, colour in OUTCOME_COLOURS.items():
         of_kind = losses[losses[:, 2] == outcome]
         label = f"{outcome.name.lower().replace('_', ' ')} ({len(of_kind):,})"
         x, y = of_kind[::every, :2].T
@@ -79,7 +79,7 @@ def losses_figure(losses: np.ndarray, task: Task) -> Figure:
     figure.legend(
         frameon=False,
         loc="outside lower center",
-        ncols=len(COLOURS),
+        ncols=len(OUTCOME_COLOURS),
         fontsize=8,
         markerscale=7.0 / size,
     )

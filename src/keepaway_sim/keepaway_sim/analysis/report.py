@@ -26,7 +26,7 @@ from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.task import Action, Outcome
 
 ROWS_AT_ONCE = 5000  # episodes that are written together
-SCHEMA = pa.schema(
+TABLE_SCHEMA = pa.schema(
     [
         (name, {int: pa.int64(), float: pa.float64(), str: pa.string()}[kind])
         for name, kind in {
@@ -56,7 +56,7 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
     output.mkdir(parents=True, exist_ok=True)
     _write_table(analyst.rows(), output)
     tally, task = analyst.tally, bag.task
-    summary = summarise(bag, tally) | {"missing": analyst.gaps.report()}
+    summary = summarise_match(bag, tally) | {"missing": analyst.gaps.report()}
     (output / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     made_by = f"{bag.match['task']}, seed {bag.match['seed']}, {bag.match['code_version']}"
     for name, figure in (
@@ -72,7 +72,7 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
 
 def _write_table(rows: Iterator[EpisodeRow], output: Path) -> None:
     with ExitStack() as stack:
-        parquet = stack.enter_context(pq.ParquetWriter(output / "episodes.parquet", SCHEMA))
+        parquet = stack.enter_context(pq.ParquetWriter(output / "episodes.parquet", TABLE_SCHEMA))
         file = stack.enter_context((output / "episodes.csv").open("w", newline=""))
         writer = csv.writer(file)
         writer.writerow(EpisodeRow._fields)
@@ -87,11 +87,11 @@ def _write_table(rows: Iterator[EpisodeRow], output: Path) -> None:
 
 
 def _arrow(rows: list[EpisodeRow]) -> pa.Table:
-    columns = zip(*rows, strict=True) if rows else ((),) * len(SCHEMA)
-    return pa.table([list(column) for column in columns], schema=SCHEMA)
+    columns = zip(*rows, strict=True) if rows else ((),) * len(TABLE_SCHEMA)
+    return pa.table([list(column) for column in columns], schema=TABLE_SCHEMA)
 
 
-def summarise(bag: MatchBag, tally: Tally) -> dict[str, Any]:
+def summarise_match(bag: MatchBag, tally: Tally) -> dict[str, Any]:
     """A match in a few numbers."""
     durations = np.array(tally.durations)
     outcomes = np.array(tally.outcomes, dtype=np.int64)

@@ -39,7 +39,7 @@ class Block(NamedTuple):
         return Block(data, rows, self.keys)
 
 
-def joined(blocks: Sequence[Block]) -> Block:
+def in_order(blocks: Sequence[Block]) -> Block:
     """All blocks as one, in the order of keys; messages of one key in the blocks' order."""
     if len(blocks) == 1:
         data, rows, keys = blocks[0]

@@ -64,7 +64,9 @@ def read_agents(text: str) -> dict[str, dict[str, Any]]:
         for key, value in settings.items():
             words = value if isinstance(value, list) else [value]
             if not all(isinstance(word, str | int | float | bool | None) for word in words):
-                raise KeepawayError(f"info 'agents': {shown(name)}.{shown(key)} is no plain value")
+                raise KeepawayError(
+                    f"info 'agents': {printable(name)}.{printable(key)} is no plain value"
+                )
     return agents
 
 
@@ -101,7 +103,7 @@ def check_match(values: Mapping[str, Any]) -> Task:
             raise KeepawayError(f"{name} of its Match is a {type(values[name]).__name__}")
     for name in ("task", "profile", "code_version"):
         if len(values[name]) > _LONGEST_NAME or not values[name].isprintable():
-            raise KeepawayError(f"{name}={shown(values[name])}: not a name")
+            raise KeepawayError(f"{name}={printable(values[name])}: not a name")
     sides = values["field_length"], values["field_width"]
     task = Task(values["num_keepers"], values["num_takers"], *sides)
     _check_names(values["player_names"], task)
@@ -196,7 +198,7 @@ def check_count(count: int) -> int:
     return count
 
 
-def shown(text: object) -> str:
+def printable(text: object) -> str:
     """Of an untrusted text as much as a line holds, without anything that rules a terminal."""
     return repr(str(text)[:40])
 
@@ -208,7 +210,7 @@ def _check_names(names: list[Any], task: Task) -> None:
         )
     for name in names:
         if not _PLAYER_NAME.fullmatch(name):
-            raise KeepawayError(f"player_names has {shown(name)}: not a name")
+            raise KeepawayError(f"player_names has {printable(name)}: not a name")
 
 
 def _check_numbers(data: np.ndarray, *names: str) -> None:

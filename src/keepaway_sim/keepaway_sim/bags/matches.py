@@ -232,7 +232,7 @@ def _layouts(reader: BagReader, match: Found) -> dict[int, Any]:
         if expected is None:
             continue
         if topic.message_type != expected:
-            carried = checked.shown(topic.message_type)
+            carried = checked.printable(topic.message_type)
             raise KeepawayError(f"{reader.path}: {topic.name} carries {carried}, not {expected}")
         reader.number(topic.name)  # of one type only
         codec = reader.codec_of(number)

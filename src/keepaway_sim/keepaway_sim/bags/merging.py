@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from keepaway_sim.bags.blocks import Block, Piece, joined
+from keepaway_sim.bags.blocks import Block, Piece, in_order
 from keepaway_sim.bags.spilling import spilled
 
 WINDOW_SIZE = 2**24  # [bytes] of messages that are brought into order together
@@ -58,7 +58,7 @@ def _merged(pieces: Iterable[Piece], load: Callable[[Any], Block]) -> Iterator[B
             if sum(len(block.rows) for block in kept):
                 ranks = [piece.rank for piece in waiting[: len(kept)]]
                 order = sorted(range(len(kept)), key=ranks.__getitem__)
-                yield joined([kept[place] for place in order])
+                yield in_order([kept[place] for place in order])
             if top is None:
                 return
             floor = top

@@ -13,10 +13,10 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from keepaway_sim.bags.blocks import Block, Piece, joined
+from keepaway_sim.bags.blocks import Block, Piece, in_order
 from keepaway_sim.errors import KeepawayError
 
-BLOCKS_A_WINDOW = 4  # of every run
+BLOCKS_OF_A_RUN = 4  # that fit a window together with as many of every other
 
 
 class _Stored(NamedTuple):
@@ -47,7 +47,7 @@ def spilled(
     """
     pieces = list(pieces)
     num_runs = 1 + sum(piece.size for piece in pieces) // window
-    block_size = max(1, window // (BLOCKS_A_WINDOW * num_runs))
+    block_size = max(1, window // (BLOCKS_OF_A_RUN * num_runs))
     file = tempfile.TemporaryFile(prefix="keepaway-sorted-")  # noqa: SIM115  # closed below
     try:
         stored = [
@@ -75,10 +75,10 @@ def _runs(pieces: Iterable[Piece], load: Callable[[Any], Block], window: int) ->
         kept.append(load(piece.source).packed())
         size += len(kept[-1].data)
         if size >= window:
-            yield joined(kept)
+            yield in_order(kept)
             kept, size = [], 0
     if kept:
-        yield joined(kept)
+        yield in_order(kept)
 
 
 def _store(file: IO[bytes], run: Block, number: int, block_size: int) -> Iterator[Piece]:

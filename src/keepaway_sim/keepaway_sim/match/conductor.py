@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.beginning import begin_match, random_match_id
 from keepaway_sim.match.recorders import RecorderProgress
 from keepaway_sim.match.roster import Roster, checked_status
@@ -26,7 +26,6 @@ from keepaway_sim.world.world import World
 
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
-LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another one refuses to play
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 

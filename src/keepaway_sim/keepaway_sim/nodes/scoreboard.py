@@ -11,13 +11,13 @@ from rclpy.node import Node
 from tqdm import tqdm
 
 from keepaway_msgs.msg import Episode, Match
+from keepaway_sim.errors import LOG_PERIOD
 from keepaway_sim.match.scores import Score, summary
 from keepaway_sim.ros.publishing import ALL, MATCHES, QUEUE
 from keepaway_sim.task import Outcome
 
 TERMINAL_PERIOD, FILE_PERIOD = 0.5, 10.0
 """[s] between two reports."""
-LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 RECENT = 20
 """Episodes of the mean that is shown."""
 

@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match
 from keepaway_sim.bags.field_recorder import world_info
 from keepaway_sim.bags.writer import BagWriter
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
 from keepaway_sim.ros.diagnostics import Troubles, diagnostics, simulator_status
@@ -38,7 +38,6 @@ from keepaway_sim.world.config import Config, Physics, Skills, Vision, profile
 from keepaway_sim.world.world import World
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
-LOG_PERIOD = 5.0  # [s] the same warning is not given more often
 OWN_TOPICS = ("match", "episode", "field_state", "/clock")
 """No other node publishes these in a match."""
 

@@ -7,14 +7,13 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from keepaway_sim.bags.topics import Qos
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.ros.subscribing import listen, take_all, to_profile
 from keepaway_sim.view.live import LiveMatch
 from keepaway_sim.wire.messages import ACTION_REQUEST, EPISODE, FIELD_STATE, MATCH, PERCEPTION
 
-POLL_PERIOD = 0.02  # [s]
+DRAIN_PERIOD = 0.02  # [s]
 EVERY_CYCLE = Qos(100)  # what is not taken in time is missed
-LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 
 
 class Spectator(Node):

@@ -25,10 +25,10 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Action, Task
 from keepaway_sim.world.config import NEVER
 
-NONE = -32768
+NO_VALUE = -32768
 """In a frame: not known."""
 _CYCLES = 2**15  # a frame has a cycle's number in two parts: below this, and how often this
-MAX_CYCLES = 12_000
+MOST_CYCLES_SHOWN = 12_000
 """Cycles in a page if its episodes are not chosen: about 5 MB of 3v2."""
 
 
@@ -82,8 +82,8 @@ def frames(track: Track, task: Task) -> np.ndarray:
 
 def _int16(values: np.ndarray) -> np.ndarray:
     known = np.isfinite(values)
-    clipped = np.clip(np.rint(np.where(known, values, 0)), NONE + 1, 32767)
-    whole: np.ndarray = np.where(known, clipped, NONE).astype("<i2")
+    clipped = np.clip(np.rint(np.where(known, values, 0)), NO_VALUE + 1, 32767)
+    whole: np.ndarray = np.where(known, clipped, NO_VALUE).astype("<i2")
     return whole
 
 
@@ -148,7 +148,7 @@ def episode_data(episode: EpisodeSummary) -> dict[str, Any]:
 def replay_page(
     path: Path | str,
     numbers: Collection[int] | None = None,
-    max_cycles: int = MAX_CYCLES,
+    max_cycles: int = MOST_CYCLES_SHOWN,
     number: int | None = None,
 ) -> tuple[str, str]:
     """The page of a bag, all in one text; and what the bag misses, in words.

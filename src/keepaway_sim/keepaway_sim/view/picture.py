@@ -11,12 +11,8 @@ from matplotlib.patches import Circle, Rectangle, Wedge
 
 from keepaway_sim.bags.match_bag import Track
 from keepaway_sim.task import Action, Outcome, Role, Task
+from keepaway_sim.view.palette import CHALK, GRASS, INK, TEAM_COLOURS
 from keepaway_sim.world.config import NEVER, Physics
-
-GRASS, CHALK, INK = "#2c6e49", "#e9f3ec", "#10201a"
-
-
-COLOURS = {Role.KEEPER: "#56b4e9", Role.TAKER: "#ff9e4a"}
 
 
 def picture(
@@ -41,9 +37,9 @@ def picture(
         role = task.role(k)
         face = track.yaw[row, k] + track.neck[row, k]
         if visible_angle < 2 * math.pi - 1e-6:
-            _draw_view(axes, track.position[row, k], face, visible_angle, COLOURS[role])
+            _draw_view(axes, track.position[row, k], face, visible_angle, TEAM_COLOURS[role])
         label = f"{'K' if role == Role.KEEPER else 'T'}{name.split('_')[1]}"
-        _draw_player(axes, track.position[row, k], track.yaw[row, k], COLOURS[role], label)
+        _draw_player(axes, track.position[row, k], track.yaw[row, k], TEAM_COLOURS[role], label)
     if player >= 0:
         _draw_belief(axes, track, row, player, task)
     axes.add_patch(Circle(track.position[row, -1], 0.3, fc="white", ec=INK, lw=1.2, zorder=6))
@@ -77,7 +73,7 @@ def _draw_intent(axes: Axes, track: Track, row: int, player: int, task: Task) ->
         return
     ends = track.position[row, [player, target]].T
     style = "--" if action == Action.PASS_BALL else ":"
-    axes.plot(*ends, style, color=COLOURS[task.role(player)], lw=1.6, zorder=2)
+    axes.plot(*ends, style, color=TEAM_COLOURS[task.role(player)], lw=1.6, zorder=2)
 
 
 def _draw_view(axes: Axes, at: np.ndarray, face: float, angle: float, colour: str) -> None:
@@ -104,7 +100,7 @@ def _draw_belief(axes: Axes, track: Track, row: int, player: int, task: Task) ->
         if k == player or track.age[row, player, k] >= NEVER:
             continue
         thought = track.believed[row, player, k]
-        colour = "white" if k == task.num_players else COLOURS[task.role(k)]
+        colour = "white" if k == task.num_players else TEAM_COLOURS[task.role(k)]
         axes.plot(*np.stack([track.position[row, k], thought]).T, ":", color=colour, lw=1, zorder=3)
         axes.add_patch(Circle(thought, 0.62, fill=False, ec=colour, lw=1.6, zorder=5))
 

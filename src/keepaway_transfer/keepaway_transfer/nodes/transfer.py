@@ -22,7 +22,7 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_transfer.mapping import load_mapping
 from keepaway_transfer.rho import Transfer, transferred
 
-PATIENCE = 0.25  # [s] at most, from being told to end to ending
+SPIN_TIMEOUT = 0.25  # [s] at most, from being told to end to ending
 
 
 class TransferNode(Node):
@@ -78,5 +78,5 @@ def main(args: list[str] | None = None) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(TransferNode())
     while not told:
-        executor.spin_once(timeout_sec=PATIENCE)
+        executor.spin_once(timeout_sec=SPIN_TIMEOUT)
     rclpy.try_shutdown()

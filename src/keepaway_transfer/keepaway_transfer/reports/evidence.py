@@ -14,7 +14,7 @@ from keepaway_transfer.reports.summary import (
     measure_trials,
     summarise,
 )
-from keepaway_transfer.studies.results import STUDY_FILE, Results, read_results
+from keepaway_transfer.studies.results import STUDY_FILE, StudyResults, read_results
 from keepaway_transfer.studies.study import Row, Study
 
 
@@ -22,7 +22,7 @@ from keepaway_transfer.studies.study import Row, Study
 class Evidence:
     """The results of one study with all that was worked out of them."""
 
-    results: Results
+    results: StudyResults
     threshold: float | None = None  # [s] another than the study's
 
     @property

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer.errors import LogError
-
-CYCLE_TIME = 0.1  # [s]
 
 _HEADER = """\
 # Keepers: {num_keepers}

@@ -18,8 +18,8 @@ from keepaway_transfer.reports.page_parts import (
     elsewhere,
     not_run,
     own_picture,
-    picture,
     said_of,
+    shown_picture,
     study_table,
 )
 from keepaway_transfer.reports.report import power, spread
@@ -87,7 +87,7 @@ def _rows(studies: Studies) -> Lines:
         "",
         power(table2.measures, table2.study),
         "",
-        picture("Hours to 9.0 s by episodes of 3v2", "table2"),
+        shown_picture("Hours to 9.0 s by episodes of 3v2", "table2"),
     ]
     lines += _at_lower_threshold(studies)
     for name, words, figure in (
@@ -96,11 +96,11 @@ def _rows(studies: Studies) -> Lines:
     ):
         if (found := studies.get(name)) is not None:
             lines += ["", f"### {words}", "", *study_table(found, found.scratch, "row")]
-            lines += ["", picture(words, name, figure)]
+            lines += ["", shown_picture(words, name, figure)]
     for name in ("rho_variants", "variants_1000"):
         if (found := studies.get(name)) is not None:
             lines += ["", f"### Other ways than rho (`{name}`)", "", *_variants(found)]
-            lines += ["", picture("Hours to 9.0 s by the way of transfer", name)]
+            lines += ["", shown_picture("Hours to 9.0 s by the way of transfer", name)]
     return lines
 
 
@@ -135,7 +135,7 @@ def _optimism(studies: Studies) -> Lines:
         "",
         *study_table(optimistic, optimistic.scratch, "level"),
         "",
-        picture("Hours to 9.0 s by the level of the start", "optimistic"),
+        shown_picture("Hours to 9.0 s by the level of the start", "optimistic"),
     ]
     if (table2 := studies.get("table2")) is not None:
         lines += ["", _of_transfers_gain(table2, optimistic, best)]
@@ -223,7 +223,7 @@ def _overtraining(studies: Studies) -> Lines:
         for reference in one.study.references:
             lines += ["", f"`{name}`, against {reference}:", ""]
             lines += study_table(one, reference, "row")
-        lines += ["", picture("Hours to 9.0 s", name)]
+        lines += ["", shown_picture("Hours to 9.0 s", name)]
     return lines
 
 

@@ -84,7 +84,7 @@ def not_run(*names: str) -> Lines:
     return [f"Not known yet: what would show it was not run in this world ({commands})."]
 
 
-def picture(title: str, study: str, figure: str = "time_to_threshold") -> str:
+def shown_picture(title: str, study: str, figure: str = "time_to_threshold") -> str:
     """A figure of a study."""
     return f"![{title}](../results/{study}/{figure}.png)"
 

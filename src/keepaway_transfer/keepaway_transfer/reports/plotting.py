@@ -14,15 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from keepaway_transfer.metrics import Floats
 from keepaway_transfer.reports.statistics import Curve, Interval, SurvivalCurve
 
-COLOURS = ("#444444", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+ROW_COLOURS = ("#444444", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which colour-blind people can tell apart; the first is for the scratch row."""
 FAINT, BAND = 0.45, 0.18  # opacity of single trials and of intervals
-
-Floats = NDArray[np.float64]
 
 
 class CurveGroup(NamedTuple):
@@ -44,8 +43,8 @@ def learning_curves(
         title: above the axes.
     """
     figure, axes = _figure(title, "Training time (simulated hours)", "Episode duration (s)")
-    for (label, group), colour in zip(groups.items(), COLOURS, strict=False):
-        style = ":" if colour == COLOURS[0] else "-"
+    for (label, group), colour in zip(groups.items(), ROW_COLOURS, strict=False):
+        style = ":" if colour == ROW_COLOURS[0] else "-"
         axes.plot(hours, group.trials.T, style, color=colour, linewidth=0.8, alpha=FAINT)
         axes.plot(hours, group.mean.estimate, color=colour, linewidth=2.2, label=label)
         axes.fill_between(
@@ -61,7 +60,7 @@ def learning_curves(
     return figure
 
 
-def time_to_threshold(
+def time_to_threshold_figure(
     rows: Sequence[str],
     target: Sequence[Interval],
     total: Sequence[Interval],
@@ -83,12 +82,12 @@ def time_to_threshold(
         connected: by lines, as rows are whose order means something.
     """
     figure, axes = _figure(title, rows_are, "Simulated hours to threshold")
-    axes.axhspan(scratch.low, scratch.high, color=COLOURS[0], alpha=BAND, linewidth=0)
-    axes.axhline(scratch.estimate, color=COLOURS[0], linestyle=":", label="from scratch")
+    axes.axhspan(scratch.low, scratch.high, color=ROW_COLOURS[0], alpha=BAND, linewidth=0)
+    axes.axhline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label="from scratch")
     places = np.arange(len(rows))
     for label, intervals, colour, shift in (
-        ("target task", target, COLOURS[1], -0.08),
-        ("source + target", total, COLOURS[2], 0.08),
+        ("target task", target, ROW_COLOURS[1], -0.08),
+        ("source + target", total, ROW_COLOURS[2], 0.08),
     ):
         estimate, low, high = np.array(intervals).T
         axes.errorbar(
@@ -139,7 +138,7 @@ def intervals(
     places = np.arange(len(labels))[::-1]
     middle, low, high = np.array(estimates).T
     axes.errorbar(
-        middle, places, xerr=[middle - low, high - middle], color=COLOURS[1], marker="o",
+        middle, places, xerr=[middle - low, high - middle], color=ROW_COLOURS[1], marker="o",
         markersize=6, capsize=3, linewidth=1.2, linestyle="none",
     )  # fmt: skip
     axes.set_yticks(places, labels)
@@ -174,7 +173,7 @@ def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> 
     return figure
 
 
-def save(figure: Figure, path: Path | str, made_by: str) -> None:
+def save_figure(figure: Figure, path: Path | str, made_by: str) -> None:
     """Write a PNG that tells what made it: study, settings, seed, version."""
     figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
     figure.savefig(path, dpi=150, metadata={"Description": made_by})
@@ -193,6 +192,6 @@ def _figure(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
 
 def _colours(count: int) -> list[str]:
     """`count` colours to tell lines apart: the palette's, or a scale if it has too few."""
-    if count <= len(COLOURS):
-        return list(COLOURS[:count])
+    if count <= len(ROW_COLOURS):
+        return list(ROW_COLOURS[:count])
     return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0, 0.95, count))]

@@ -21,7 +21,7 @@ from keepaway_transfer.reports.summary import (
     verdict,
 )
 from keepaway_transfer.studies.records import Record
-from keepaway_transfer.studies.results import Results
+from keepaway_transfer.studies.results import StudyResults
 from keepaway_transfer.studies.study import Row, Study
 
 SHOWN_TRIALS = 5  # single learning curves a row, as in the paper's Figure 3
@@ -60,7 +60,7 @@ def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
 
 
 def write_report(
-    results: Results,
+    results: StudyResults,
     folder: Path | str,
     *,
     threshold: float | None = None,
@@ -90,7 +90,7 @@ def write_report(
     (folder / "table.md").write_text(text, encoding="utf-8")
     drawn = [study.references[0], *(curves or _best(rows, study.references[0]))]
     for name, figure in _figures(results, measures, rows, drawn, threshold).items():
-        plotting.save(figure, folder / f"{name}.png", made_by)
+        plotting.save_figure(figure, folder / f"{name}.png", made_by)
     return text
 
 
@@ -143,7 +143,7 @@ def _comparison_table(rows: Sequence[RowSummary], reference: str) -> list[str]:
     return lines
 
 
-def _made_by(results: Results) -> str:
+def _made_by(results: StudyResults) -> str:
     study = results.study
     versions = ", ".join(sorted({one.code_version for one in results.records}))
     made_by = (
@@ -160,7 +160,7 @@ def _best(rows: Sequence[RowSummary], scratch: str) -> list[str]:
 
 
 def _figures(
-    results: Results,
+    results: StudyResults,
     measures: Sequence[TrialMeasures],
     rows: Sequence[RowSummary],
     drawn: Sequence[str],
@@ -184,7 +184,7 @@ def _time_figures(
 ) -> dict[str, Figure]:
     goal = f"Time to a mean of {threshold:g} s in {study.target}"
     return {
-        "time_to_threshold": plotting.time_to_threshold(
+        "time_to_threshold": plotting.time_to_threshold_figure(
             [row.name for row in rows],
             [row.target for row in rows],
             [row.total for row in rows],

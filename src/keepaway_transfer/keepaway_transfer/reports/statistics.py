@@ -9,16 +9,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from statsmodels.duration.survfunc import SurvfuncRight
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.power import TTestIndPower
 
+from keepaway_transfer.metrics import Floats
+
 CONFIDENCE = 0.95
 RESAMPLES = 10_000
-
-Floats = NDArray[np.float64]
 
 
 class Interval(NamedTuple):

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from keepaway_sim.world.config import CYCLE_TIME
 from keepaway_transfer import metrics
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.reports import statistics
-from keepaway_transfer.reports.kwy import CYCLE_TIME
 from keepaway_transfer.reports.statistics import Comparison, Interval
 from keepaway_transfer.studies.records import Record
-from keepaway_transfer.studies.results import Results
+from keepaway_transfer.studies.results import StudyResults
 from keepaway_transfer.studies.study import Study
 
 EQUIVALENT_HOURS = 2.0
@@ -80,7 +80,7 @@ class RowSummary:
     against: dict[str, Against]  # by reference row
 
 
-def measure_trials(results: Results, threshold: float | None = None) -> list[TrialMeasures]:
+def measure_trials(results: StudyResults, threshold: float | None = None) -> list[TrialMeasures]:
     """The measures of every trial, in the order of the rows.
 
     Args:
@@ -104,7 +104,7 @@ def measure_trials(results: Results, threshold: float | None = None) -> list[Tri
     return [_measures(record, study, threshold, horizon, goes_on) for record in records]
 
 
-def goes_on_after_threshold(results: Results) -> bool:
+def goes_on_after_threshold(results: StudyResults) -> bool:
     """Did all trials run for the same time, whenever they reached the threshold?
 
     If not, what they hold at their end is the threshold, by construction.
@@ -173,7 +173,7 @@ def seconds(cycles: Sequence[int]) -> metrics.Floats:
     return np.asarray(cycles, dtype=np.float64) * CYCLE_TIME
 
 
-def checked_threshold(results: Results, threshold: float | None) -> float:
+def checked_threshold(results: StudyResults, threshold: float | None) -> float:
     """The threshold to use [s]: the study's, or another one that its trials were run to."""
     study = results.study
     if threshold is None or threshold == study.threshold:

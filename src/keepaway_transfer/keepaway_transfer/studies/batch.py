@@ -33,7 +33,7 @@ from keepaway_transfer.studies.study import Row, Study
 from keepaway_transfer.variants import constant, variant_of
 
 CYCLES_PER_HOUR = SECONDS_PER_HOUR / CYCLE_TIME
-GREEDY, CHOICE, SHUFFLE, TARGET = 100, 101, 102, 103  # seeds of what is no source stage
+GREEDY_PLAY, CHOICE, SHUFFLE, TARGET = 100, 101, 102, 103  # seeds of what is no source stage
 
 
 @dataclass
@@ -176,7 +176,7 @@ def _play_greedily(study: Study, states: Sequence[_TrialState]) -> None:
     )
     runs = [
         Trial(
-            seed=_seed(study, study.target_name(state.row), state.number, GREEDY),
+            seed=_seed(study, study.target_name(state.row), state.number, GREEDY_PLAY),
             stop=stop,
             keeper_policy="greedy",
             keeper_weights=state.learned,

@@ -14,7 +14,7 @@ from keepaway_transfer.studies.results import ResultsFolder, StudyTrial
 from keepaway_transfer.studies.study import Study
 
 Key = tuple[str, int]  # a row's name and a trial's number
-Play = Callable[[Study, Sequence[Key]], list[StudyTrial]]
+PlayBatch = Callable[[Study, Sequence[Key]], list[StudyTrial]]
 
 TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
 
@@ -51,11 +51,11 @@ def run(
     study: Study,
     results: ResultsFolder,
     executor: Executor,
-    play: Play,
+    play: PlayBatch,
     batch: int,
     shield: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Iterator[StudyTrial]:
-    """Play the trials that are left and yield each once it is on the disk.
+    """PlayBatch the trials that are left and yield each once it is on the disk.
 
     Stopping the iteration gives up the batches that were not begun. A batch that has been played is
     written in a `shield`, that lets a signal wait.

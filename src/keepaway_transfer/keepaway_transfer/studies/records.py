@@ -24,11 +24,11 @@ from keepaway_transfer import metrics
 from keepaway_transfer.errors import StudyError
 
 RECORDS_FILE = "trials.parquet"
-FORMAT = {"format": "keepaway trials", "version": "1"}
+TRIALS_FORMAT = {"format": "keepaway trials", "version": "1"}
 BLOCKS_A_WINDOW = 20
 
 _CYCLES = pa.list_(pa.uint32())
-SCHEMA = pa.schema(
+TRIALS_SCHEMA = pa.schema(
     [
         ("row", pa.string()),
         ("number", pa.uint32()),
@@ -49,7 +49,7 @@ SCHEMA = pa.schema(
         ("last", _CYCLES),
         ("code_version", pa.string()),
     ],
-    metadata=FORMAT,
+    metadata=TRIALS_FORMAT,
 )
 
 
@@ -126,7 +126,7 @@ def write_records(path: Path, records: Iterable[Record]) -> None:
     The same records give the same bytes.
     """
     rows = [dataclasses.asdict(one) for one in sorted(records, key=lambda one: one.key)]
-    table = pa.Table.from_pylist(rows, schema=SCHEMA)
+    table = pa.Table.from_pylist(rows, schema=TRIALS_SCHEMA)
     with moved_into_place(path, overwrite=True) as file:
         pq.write_table(
             table, file, compression="zstd", compression_level=19,
@@ -151,7 +151,7 @@ def read_records(path: Path) -> tuple[Record, ...]:
     except (OSError, ValueError) as error:
         raise StudyError(f"{path}: not a Parquet file: {error}") from error
     found = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
-    if not FORMAT.items() <= found.items():
+    if not TRIALS_FORMAT.items() <= found.items():
         raise StudyError(f"{path}: not trials of a study: its metadata are {shown(found)}")
     names = [field.name for field in dataclasses.fields(Record)]
     if missing := set(names) - set(table.column_names):

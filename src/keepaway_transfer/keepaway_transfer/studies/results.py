@@ -66,7 +66,7 @@ class StudyTrial:
 
 
 @dataclass(frozen=True)
-class Results:
+class StudyResults:
     """A results folder that was read: the study and the records of its trials so far."""
 
     study: Study
@@ -90,7 +90,7 @@ def record_of(trial: StudyTrial, study: Study) -> Record:
     )
 
 
-def read_results(folder: Path | str) -> Results:
+def read_results(folder: Path | str) -> StudyResults:
     """Read a results folder, packed or not.
 
     Raises:
@@ -108,7 +108,7 @@ def read_results(folder: Path | str) -> Results:
     packed = _read_packed(folder)
     known = {record.key for record in packed}
     fresh = tuple(record_of(one, study) for one in read_trials(folder) if one.key not in known)
-    return Results(study, *about, (*packed, *fresh), str(head.get("note", "")))
+    return StudyResults(study, *about, (*packed, *fresh), str(head.get("note", "")))
 
 
 def read_trials(folder: Path | str) -> Iterator[StudyTrial]:
