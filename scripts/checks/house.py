@@ -36,7 +36,7 @@ TWIN_NAMES = {
     *("Action", "Role", "Outcome", "NEVER", "HEADER", "CYCLE_TIME", "LOG_PERIOD", "RESEND_PERIOD"),
     *("MAX_FIELD_SIDE", "MAX_TEAM_SIZE", "SettingError", "Spin"),
 }
-"""What agents say again, because they import nothing of the simulator; tests hold the values equal."""
+"""What agents say again, as they import nothing of the simulator; tests hold the values equal."""
 TABLE = re.compile(r"(<!-- table: ([^>]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 
