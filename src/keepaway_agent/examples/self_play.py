@@ -8,7 +8,6 @@ beside two hand-coded teams on the same seeds.
 """
 
 import argparse
-import math
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,6 +35,7 @@ class Args:
     task: str = "3v2"  # keepers v takers
     hours: float = 4.0  # simulated, of learning
     episodes: int = 60  # of every pair afterwards
+    longest: float = 120.0  # [s] then one of these is cut off: takers may have learned to keep away
     gamma: float = 0.99  # discount per cycle
     epsilon_from: float = 0.3  # share of random choices at first
     epsilon_to: float = 0.02  # and in the end
@@ -107,17 +107,18 @@ def learn(args: Args) -> tuple[dict[str, Team], np.ndarray]:
 def evaluate(args: Args, teams: dict[str, Team]) -> np.ndarray:
     """(num_episodes,) durations [s]; a team that is not among `teams` is hand-coded."""
     who = "both" if len(teams) == 2 else f"{next(iter(teams))}s"
-    env = keepaway_v0.turn_based_env(teams=who, task=args.task)
+    longest = round(args.longest / SECONDS_PER_CYCLE)
+    env = keepaway_v0.turn_based_env(teams=who, task=args.task, max_cycles=longest)
     durations = []
     for episode in range(args.episodes):
         env.reset(seed=FIRST_SEED + episode)
         cycle = 0
         for agent in env.agent_iter():
-            seen, _, terminated, _, info = env.last()
+            seen, _, terminated, truncated, info = env.last()
             team = teams[agent.partition("_")[0]]
-            env.step(None if terminated else team.choose(agent, seen, 0.0))
+            env.step(None if terminated or truncated else team.choose(agent, seen, 0.0))
             cycle = info["cycle"]
-        durations.append(cycle * SECONDS_PER_CYCLE)
+        durations.append(min(cycle * SECONDS_PER_CYCLE, args.longest))
     return np.array(durations)
 
 
@@ -155,7 +156,7 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     teams, durations = learn(args)
     print(f"learned in {len(durations):,} episodes")
-    rules = HandCoded(args.task, args.episodes, longest=math.inf, seed=FIRST_SEED)
+    rules = HandCoded(args.task, args.episodes, longest=args.longest, seed=FIRST_SEED)
     pairs = {
         "hand-coded keepers v hand-coded takers": play(rules, planned=False),
         "learned keepers v hand-coded takers": evaluate(args, {"keeper": teams["keeper"]}),
