@@ -13,10 +13,10 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from environment_page import keep, made_here, speed
 
 from keepaway_agent.environments import (
     KeepawayAECEnv,
@@ -26,9 +26,6 @@ from keepaway_agent.environments import (
 )
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
-
-PAGE = Path(__file__).resolve().parents[2] / "src/keepaway_agent/docs/environments.md"
-BEGIN, END = "<!-- speed: begin -->", "<!-- speed: end -->"
 
 Play = Callable[[int], int]
 """Plays at least so many cycles a field; how many they were, of all fields."""
@@ -156,35 +153,21 @@ def measure(group: dict[str, Callable[[], Play]], cycles: int, rounds: int) -> d
     return {name: played[name] / spent[name] for name in plays}
 
 
-def table(cycles: int, rounds: int) -> str:
-    """All of them, as rows of Markdown."""
-    rows = ["| | cycles a CPU second | of the trainer's |", "|---|---|---|"]
-    for fields, group in GROUPS.items():
-        speeds = measure(group, cycles * max(1, 64 // int(fields.split()[0])), rounds)
-        for name, speed in speeds.items():
-            share = f"{speed / speeds['trainer']:.2f}"
-            rows.append(f"| {fields}, {name} | {speed:,.0f} | {share} |")
-    return "\n".join(rows)
-
-
 def main() -> int:
     """Print the table, or write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "--cycles",
-        type=int,
-        default=500,
-        help="a field and turn where there are many (default 500)",
-    )
+    parser.add_argument("--cycles", type=int, default=500, help="a field and turn (default 500)")
     parser.add_argument("--rounds", type=int, default=5, help="turns of each (default 5)")
-    parser.add_argument("--write", action="store_true", help=f"write it into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help="write it into environments.md")
     args = parser.parse_args()
-    rows = table(args.cycles, args.rounds)
-    print(rows)
+    speeds = {}
+    for fields, group in GROUPS.items():
+        cycles = args.cycles * max(1, 64 // int(fields.split()[0]))  # few fields play longer
+        speeds[fields] = measure(group, cycles, args.rounds)
+    figures = {"cycles_a_cpu_second": speeds}
+    print(speed(figures))
     if args.write:
-        text = PAGE.read_text()
-        before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-        PAGE.write_text(f"{before}{BEGIN}\n{rows}\n{END}{after}")
+        keep({"speed": made_here() | figures})
     return 0
 
 

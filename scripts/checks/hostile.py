@@ -5,6 +5,7 @@
 Each class is called in a process of its own. A call must give what its class documents, or be
 refused with `AgentError` or `KeepawayError`. Anything else - another exception, an observation
 outside its space, a process that ends - is printed with the calls before it, and the script fails.
+With `--write` the counts are written into docs/environments.md.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from environment_page import keep, made_here
 
 from keepaway_agent.environments import (
     KeepawayAECEnv,
@@ -175,22 +177,32 @@ def main() -> int:
     parser.add_argument("--calls", type=int, default=20_000, help="of each class (default 20,000)")
     parser.add_argument("--seed", type=int, default=0, help="of what is called")
     parser.add_argument("--only", action="append", choices=CLASSES, help="in this process")
+    parser.add_argument("--write", action="store_true", help="write it into environments.md")
     args = parser.parse_args()
     for name in args.only or ():
         call_class(name, args.calls, args.seed)
     if args.only:
         return 0
     print(f"{'class':20s} {'calls':>8s} {'answered':>9s} {'refused':>8s}  with")
-    failed = 0
-    for name in CLASSES:
-        command = [sys.executable, __file__, "--only", name]
-        command += ["--calls", str(args.calls), "--seed", str(args.seed)]
-        sys.stdout.flush()
-        code = subprocess.run(command, check=False).returncode
-        if code:
-            print(f"{name}: its process ended with {code}", file=sys.stderr)
-            failed += 1
-    return int(failed > 0)
+    counts = {name: _call_in_child(name, args.calls, args.seed) for name in CLASSES}
+    if None in counts.values():
+        return 1
+    if args.write:
+        keep({"hostile": made_here() | {"calls": counts}})
+    return 0
+
+
+def _call_in_child(name: str, calls: int, seed: int) -> tuple[int, int] | None:
+    """Calls of a class, and those that were answered; None where its process failed."""
+    command = [sys.executable, __file__, "--only", name]
+    command += ["--calls", str(calls), "--seed", str(seed)]
+    done = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
+    print(done.stdout, end="", flush=True)
+    if done.returncode:
+        print(f"{name}: its process ended with {done.returncode}", file=sys.stderr)
+        return None
+    _, made, answered = done.stdout.replace(",", "").split()[:3]
+    return int(made), int(answered)
 
 
 if __name__ == "__main__":

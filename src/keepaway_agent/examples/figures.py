@@ -12,10 +12,14 @@ import numpy as np
 from keepaway_sim.version import code_version
 
 
+def made_here() -> dict[str, str]:
+    """This command, and the version of the code that it runs."""
+    return {"command": shlex.join(["python", *sys.argv]), "code_version": code_version()}
+
+
 def keep(folder: Path, name: str, **data: Any) -> None:
     """Write `figures.json`; arrays become lists with three decimals."""
-    made = {"command": shlex.join(["python", *sys.argv]), "code_version": code_version()}
-    text = json.dumps({name: made | _plain(data)}, indent=1)
+    text = json.dumps({name: made_here() | _plain(data)}, indent=1)
     (folder / "figures.json").write_text(text + "\n")
 
 

@@ -136,9 +136,11 @@ def draw(durations: np.ndarray, pairs: dict[str, np.ndarray], args: Args, path: 
     left.set_title(f"{args.task}: both teams learn")
     for place, each in enumerate(pairs.values()):
         low, high = bootstrap(each)
-        right.errorbar([place], [each.mean()], [[each.mean() - low], [high - each.mean()]], fmt="o")
-    right.set_xticks(range(len(pairs)), [name.replace(" v ", "\nv ") for name in pairs])
-    right.set(xlim=(-0.6, len(pairs) - 0.4), ylim=(0, None), ylabel="episode duration (s)")
+        right.errorbar(
+            [each.mean()], [place], xerr=[[each.mean() - low], [high - each.mean()]], fmt="o"
+        )
+    right.set_yticks(range(len(pairs)), [name.replace(" v ", "\nv ") for name in pairs])
+    right.set(xlim=(0, None), ylim=(len(pairs) - 0.4, -0.6), xlabel="episode duration (s)")
     right.set_title(f"afterwards, {args.episodes} episodes each; 95 % intervals")
     left.grid(alpha=0.3)
     right.grid(alpha=0.3)

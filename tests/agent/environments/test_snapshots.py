@@ -58,6 +58,7 @@ KINDS: dict[str, tuple[Callable[[], Any], Callable[..., list[Any]]]] = {
     "many": (lambda: KeeperVectorEnv(3, max_episode_steps=40, taker_policy="random"), play_many),
     "turns": (lambda: KeepawayAECEnv("both", task="4v3"), play_turns),
     "cycles": (lambda: KeepawayParallelEnv(task="2v1"), play_cycles),
+    "eleven against ten": (lambda: KeepawayAECEnv("both", task="11v10"), play_turns),
 }
 
 

@@ -75,6 +75,21 @@ def test_any_number_of_players_plays(task: str) -> None:
     assert all(choices[f"taker_{k + 1}"] >= 3 for k in range(sizes.num_takers))
 
 
+def test_every_n_v_m_up_to_eleven_v_ten_is_played_turn_by_turn() -> None:
+    for n in range(2, 12):
+        for m in range(1, n):
+            env = KeepawayAECEnv("both", task=f"{n}v{m}", max_cycles=6)
+            env.reset(seed=n)
+            asked = set[str]()
+            for agent in env.agent_iter():
+                seen, _, terminated, truncated, _ = env.last()
+                assert env.observation_space(agent).contains(seen)
+                over = terminated or truncated
+                asked |= set() if over else {agent}
+                env.step(None if over else n - 1)
+            assert {f"taker_{k + 1}" for k in range(m)} <= asked
+
+
 def test_a_takers_mask_opens_every_five_cycles() -> None:
     env = KeepawayParallelEnv("takers", keeper_policy="hold")
     seen, _ = env.reset(seed=1)
