@@ -19,6 +19,7 @@ from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.wire.cdr import codec
 
 ODD = 8
 
@@ -185,3 +186,25 @@ def test_no_number_rests_on_what_is_missing(messages: Many, tmp_path: Path) -> N
     assert np.isfinite(table["decisions"]).all()
     asked = layouts.without(messages, "keeper_1/action_request")
     assert episode_table(write(tmp_path / "asked.mcap", asked))["decisions"].isna().all()
+
+
+def test_a_sequence_that_no_reader_needs_may_be_missing(
+    messages: Many, match: Path, tmp_path: Path
+) -> None:
+    """Perceptions without velocities, of a writer whose definition has none."""
+    name, ours = "keepaway_msgs/msg/Perception", codec("keepaway_msgs/msg/Perception")
+    definition = b"\n".join(
+        line
+        for line in next(s.definition for s in messages if s.message_type == name).split(b"\n")
+        if line.split()[1:2] != [b"velocities"]
+    )
+    theirs = codec(name, definition.decode())
+
+    def without(said: Said) -> Said:
+        if said.message_type != name:
+            return said
+        values = {k: v for k, v in ours.decode(said.data).items() if k != "velocities"}
+        return said._replace(definition=definition, data=theirs.encode(values))
+
+    path = write(tmp_path / "bag.mcap", [without(said) for said in messages])
+    assert rows(path) == rows(match)

@@ -27,11 +27,16 @@ def fronts(layout: Codec, data: bytes, rows: np.ndarray) -> np.ndarray:
 def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, int]) -> np.ndarray:
     """(n,) messages whose sequences have these lengths, as an array of `Codec.dtype`.
 
+    Sequences that the definition has not are not looked for (`check_fields` knows who needs them).
+
     Raises:
         KeepawayError: a message whose sequences have not.
     """
     taken = _taken(layout, layout.front(lengths), data, rows)
+    known = set(taken.dtype.names or ())
     for name, length in lengths.items():
+        if f"{name}.length" not in known:
+            continue
         found = taken[f"{name}.length"]
         if (found != length).any():
             other = int(found[found != length][0])
