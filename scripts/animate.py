@@ -57,7 +57,7 @@ def parse() -> argparse.Namespace:
 
 
 def played(args: argparse.Namespace) -> Iterator[Image.Image]:
-    """A frame for every cycle of a trial, for so many seconds."""
+    """A frame for every cycle of a trial."""
     policy = args.policy or ("greedy" if args.weights else "hand")
     chosen = {"task": args.task, "policy": policy, "seed": args.seed, "episodes": 20}
     training = build(Training, chosen | {"load_weights": args.weights})

@@ -278,7 +278,7 @@ def judge_end(name: str, code: int, board: Scoreboard, restart: bool) -> None:
 def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str]:
     """The parameters with which a node that was killed resumes where it was.
 
-    A simulator resumes its own match whoever else publishes one here: players know it by its id.
+    A simulator resumes its own match beside any other: players know it by its id.
     """
     if name != "simulator":
         return ["-p", "resume:=true"]

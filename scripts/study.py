@@ -5,7 +5,7 @@
     .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2 --resume
     .venv/bin/python scripts/study.py mine.toml --scheduler tcp://cluster:8786 --out results/mine
 
-Ctrl-C, `kill` and a closed terminal stop it; it can be gone on with (--resume) whatever stopped it.
+Ctrl-C, `kill` and a closed terminal stop it; --resume continues it, whatever stopped it.
 scripts/analyze.py makes the report.
 """
 

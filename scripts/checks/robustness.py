@@ -142,7 +142,7 @@ def killed_setup(folder: Path) -> None:
     is_long=True,
 )
 def another_users_checkout(folder: Path) -> None:
-    """Needs root, to be somebody else, and a Python that others may run."""
+    """Needs root, to be another user, and a Python that others may run."""
     assert os.geteuid() == 0, "run it as root"
     place, home = folder / "checkout", folder / "home"
     home.mkdir()
@@ -333,7 +333,7 @@ def studies(folder: Path) -> None:
 
 @row(
     "the wall's clock set back by an hour under a recorded match of six processes",
-    "the match goes on to its end, and the bag is whole",
+    "the match continues to its end, and the bag is whole",
     is_long=True,
 )
 def clock_set_back(folder: Path) -> None:
@@ -392,8 +392,8 @@ def hostile_weights_described(folder: Path) -> None:
 @row(
     "requests that do not come, that come byte by byte, 23 connections where 3 may be, a browser"
     " that takes nothing, other hosts' names, `localhost` on port 80, matches with hostile names",
-    "each ends in time and holds no thread; strangers get 403; the match is refused, and names are"
-    " text",
+    "each ends in time and holds no thread; other origins get 403; the match is refused, and"
+    " names are text",
 )
 def live_server(folder: Path) -> None:
     """Browsers and their pages are not trusted."""

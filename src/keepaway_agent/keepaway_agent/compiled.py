@@ -103,7 +103,7 @@ def prepare(*calls: tuple[Kernel, tuple[Any, ...]]) -> None:
     """Compile kernels for arguments of the types of these, those that are not compiled yet.
 
     What no process has compiled before is compiled by child processes, as many at once as there
-    are processors; it says so on standard error, and goes on saying how far it is. The children end
+    are processors; it says so on standard error, and then how far it is. The children end
     with this process's wait, so that an interrupt ends it at once. Of several processes that want
     the same code one compiles it, and the others wait.
 

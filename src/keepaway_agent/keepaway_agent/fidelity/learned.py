@@ -108,7 +108,7 @@ def learn_in_stages(
 def _play_on(
     trainer: Trainer, results: Sequence[TrialResult], begin: int, episodes: int
 ) -> LearnedStage:
-    """A stage: every trial goes on from its weights after `begin` episodes."""
+    """A stage: every trial continues from its weights after `begin` episodes."""
     witnesses = [Witness() for _ in results]
     trials = [
         dataclasses.replace(

@@ -58,7 +58,7 @@ def describe(weights: LearnedWeights) -> str:
     learner, tiling = weights.sarsa, weights.tiling
     ordered = {"ball": "to the ball", "k1": "to K1"}[weights.ordering]
     lines = [
-        f"{weights.player or 'somebody'}, a {weights.role.name.lower()} in {weights.task} on"
+        f"{weights.player or 'unnamed'}, a {weights.role.name.lower()} in {weights.task} on"
         f" {weights.field_length:g} m x {weights.field_width:g} m",
         f"learned from {weights.episodes:,} episodes, {weights.hours:.1f} simulated hours",
         f"alpha {learner.alpha:g}, gamma {learner.gamma:g}, lambda {learner.lambda_:g},"

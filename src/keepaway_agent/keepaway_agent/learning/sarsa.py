@@ -259,7 +259,7 @@ def decide(learners, i, reward, cycle, uniforms):
 
 @compiled
 def resume(learners, i, cycle):
-    """The last action goes on: what it is paid counts from `cycle`, not from its decision."""
+    """The last action continues: its reward counts from `cycle`, not from its decision."""
     if learners.action[i] != NO_ACTION:
         learners.cycle[i] = cycle
 
@@ -377,7 +377,7 @@ def snapshot(learners: Learners, i: int) -> LearnerSnapshot:
 
 
 def restore(learners: Learners, i: int, snapshot: LearnerSnapshot) -> None:
-    """Let learner i, of the same tiling and rates, go on from a snapshot.
+    """Let learner i, of the same tiling and rates, resume from a snapshot.
 
     All who share its weights get those of the snapshot.
 

@@ -195,7 +195,7 @@ def read_weights(file: BinaryIO) -> LearnedWeights:
             return from_metadata(metadata, values)
     except (WeightsError, MemoryError):
         raise
-    except Exception as error:  # a stranger's bytes may break a reader in any way
+    except Exception as error:  # untrusted bytes may break a reader in any way
         raise WeightsError(f"not a whole weights file ({shown(error)})") from error
 
 

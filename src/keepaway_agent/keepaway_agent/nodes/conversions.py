@@ -112,7 +112,7 @@ def _perception_layout(num_players: int) -> struct.Struct:
 
 
 def _size_with_header(data: bytes, size: int) -> int:
-    """The bytes of a message that ends with a std_msgs/Header after so many."""
+    """The bytes of a message that ends with a std_msgs/Header."""
     end = size + _STAMP_AND_LENGTH
     return end + (_COUNT.unpack_from(data, end - _COUNT.size)[0] if len(data) >= end else 0)
 

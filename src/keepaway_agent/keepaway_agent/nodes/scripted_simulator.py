@@ -22,7 +22,7 @@ SILENCE = 0.02  # [s] to listen where no answer is due
 READY_PATIENCE = 300.0  # [s] for an agent to start, some of which compile
 
 Spin = Callable[[float], None]
-"""Lets ROS handle what has come, or waits for it at most so many seconds."""
+"""Lets ROS handle what has come, or waits for it, at most this number of seconds."""
 
 
 class ScriptedSimulator(Node):

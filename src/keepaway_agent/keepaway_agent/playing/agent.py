@@ -36,7 +36,7 @@ class MatchFacts:
     cycle_time: float  # [s]
     seed: int
     code_version: str = ""
-    first_episode: int = 0  # more than 0 where a simulator goes on with a match begun before
+    first_episode: int = 0  # more than 0 where a simulator resumes a match begun before
 
     @property
     def num_players(self) -> int:
@@ -258,7 +258,7 @@ def policy_generator(
 ) -> np.random.Generator:
     """The random numbers of a player's policy; its own in every trial and every match.
 
-    Those of a match that goes on from `first_episode` are not those of its beginning again.
+    Those of a match that is resumed from `first_episode` are not those of its beginning again.
     """
     key = (trial, POLICY_STREAM, index, *([first_episode] if first_episode else []))
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

@@ -143,7 +143,7 @@ def keeper_decision(learners, i, player, view, uniforms, order):
 
 @compiled
 def keep_passing(learners, i, cycle):
-    """No decision is due, because a pass that still needs another kick goes on.
+    """No decision is due, because a pass that still needs another kick continues.
 
     P KeepawayPlayer.cc: that counts as the last action again, so the pass is paid from its last
     kick on.
@@ -206,7 +206,7 @@ def taker_decision(learners, i, player, view, uniforms, order):
 
     A learning taker (after Iscen & Erogul 2008) chooses every `player.interval` cycles between
     going to the ball and marking one of K2..Kn, and keeps to it in between. With the ball, or
-    when it has lost sight of somebody, it goes to the ball without asking the learner.
+    when it has lost sight of a player, it goes to the ball without asking the learner.
 
     Arguments and results are those of `keeper_decision`.
     """

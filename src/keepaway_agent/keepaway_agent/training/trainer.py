@@ -39,7 +39,7 @@ from keepaway_sim.world.streams import RandomStreams
 from keepaway_sim.world.world import World
 
 WATCH_INTERVAL: Final = 200
-"""Cycles between two calls of whoever watches a run."""
+"""Cycles between two calls of the watcher of a run."""
 
 
 class Trainer:
@@ -47,7 +47,7 @@ class Trainer:
 
     Attributes:
         config: what is the same for all trials.
-        progress: of the run that goes on, or of the last.
+        progress: of the current run, or of the last.
     """
 
     def __init__(self, config: TrainerConfig, num_fields: int = 128) -> None:
@@ -93,7 +93,7 @@ class Trainer:
         """Play trials, and give each one's result as soon as it is over.
 
         Args:
-            trials: as many as one likes; the next is asked for when a field is free.
+            trials: any number; the next is asked for when a field is free.
             watch: is told of the progress every WATCH_INTERVAL cycles.
             watch_cycle: is shown the world before every cycle.
 

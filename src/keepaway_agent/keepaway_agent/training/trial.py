@@ -66,7 +66,7 @@ class StopRule:
 
 
 class Moment(NamedTuple):
-    """A cycle of a trial that is watched: all have answered, and the world has not gone on yet."""
+    """A cycle of a trial that is watched: all have answered, and the next cycle has not begun."""
 
     world: World
     field: int  # of the world, on which the trial is played

@@ -214,7 +214,9 @@ class _Crew:
     def _play_again(self, numbers: Sequence[int]) -> str:
         """Put trials in front of those that wait; what is done about it, in words."""
         self._waiting.extendleft(reversed(numbers))
-        words = f"trials {', '.join(map(str, numbers))} are played again" if numbers else "goes on"
+        words = (
+            f"trials {', '.join(map(str, numbers))} are played again" if numbers else "continues"
+        )
         if RECORDED_TRIAL in numbers and self._recorder and self._recorder.path.exists():
             self._recorder = self._recorder.anew()
             words += f" and recorded to {self._recorder.path}"

@@ -1,4 +1,4 @@
-"""What a bag says of a match is checked once, here: whoever made it, the rest need not doubt it.
+"""What a bag says of a match is checked once, here; no other module checks it again.
 
 Texts have a size, a depth and a shape; numbers are finite and possible; arrays are as long as the
 match makes them.

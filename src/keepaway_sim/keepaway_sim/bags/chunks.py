@@ -70,7 +70,7 @@ def read_chunk(stream: IO[bytes], limit: int) -> Chunk:
 
 
 def together(chunks: list[Chunk], alone: bool) -> Iterator[tuple[Chunk, ...]]:
-    """Chunks that follow each other, as many as are small; each alone, if that is wanted."""
+    """Successive chunks together while they are small; each alone, if that is wanted."""
     gathered: list[Chunk] = []
     size = 0
     for chunk in chunks:

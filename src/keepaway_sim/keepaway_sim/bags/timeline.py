@@ -148,7 +148,7 @@ def chosen_match(matches: list[Found], number: int | None, reader: BagReader) ->
     """The match that is meant.
 
     Raises:
-        KeepawayError: there are several and none was chosen, or not so many.
+        KeepawayError: there are several and none was chosen, or fewer than the chosen number.
     """
     if not number and len(matches) == 1:
         return matches[0]

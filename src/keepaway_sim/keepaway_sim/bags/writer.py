@@ -37,7 +37,7 @@ class BagWriter:
     """Writes one bag. Use it in a `with`: the bag is whole when it is left, however that happens.
 
     A file keeps an index of its chunks in memory until it is finished, so after `file_chunks` of
-    them the bag goes on in a next file, as rosbag2's do: memory does not grow with the bag, and
+    them the bag continues in a next file, as rosbag2's do: memory does not grow with the bag, and
     files that are finished stay whole whatever happens later.
 
     Attributes:
@@ -61,10 +61,10 @@ class BagWriter:
             path: a folder that does not exist yet.
             info: what made the bag.
             compression: of the chunks: "zstd", "lz4" or "none".
-            chunk_size: a chunk ends when it has so many bytes,
+            chunk_size: a chunk ends when it has this number of bytes,
             flush_interval: or after so long [s, wall time]: what is lost if the writer is killed.
                 With `math.inf` equal messages make equal files.
-            file_chunks: a file ends after about so many chunks.
+            file_chunks: a file ends after about this number of chunks.
 
         Raises:
             KeepawayError: the folder exists, or there is no such compression.

@@ -22,7 +22,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MATCHES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For subscribers of `match`: with a depth of 1 another simulator's would replace the own one's."""
 ALL = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Whoever counts episodes may come late."""
+"""For topics of events: a late subscriber gets all of them."""
 TOPICS = {
     "match": (Match, messages.MATCH, LATCHED),
     "/clock": (Clock, messages.CLOCK, QUEUE),

@@ -121,7 +121,7 @@ def _is_number(name: str) -> bool:
 
 
 class _HttpServer(ThreadingHTTPServer):
-    """A thread for each connection, but for so many only, and none for long without a request."""
+    """A thread for each of at most N connections, and none for long without a request."""
 
     daemon_threads = True
     request_queue_size = MAX_CONNECTIONS

@@ -13,7 +13,7 @@ import pymunk.batch
 
 from keepaway_sim.world.state import Discs
 
-SLOTS_A_ROW = 16  # slots of one space lie in rows of so many
+SLOTS_A_ROW = 16  # slots in a row of a space
 CELL = 16.0  # [m] of the grid by which pymunk finds neighbours
 SPACES = 8  # spaces of an eighth of the fields, two eighths..; smaller ones hold 1, 2, 4..
 
@@ -67,7 +67,7 @@ class Bodies:
         discs.touched[discs.asked[touching[touching < num_asked]]] = True
 
     def _size(self, num_asked: int) -> int:
-        """Slots of the smallest space with room for so many fields."""
+        """Slots of the smallest space with room for N fields."""
         if num_asked <= self._step:
             return min(1 << (num_asked - 1).bit_length(), self._step)
         return min(-(-num_asked // self._step) * self._step, len(self.discs.place))

@@ -112,7 +112,7 @@ def _take_request(w, f, p, action, target):
         if action == _PASS and belief.ball_kickable[f, p]:
             memory.pass_cycle[f, p] = belief.cycle[f]
             memory.pass_rank[f, p] = tactics.rank_of(w, f, p, target)
-    else:  # a pass goes on
+    else:  # a pass continues
         memory.pass_cycle[f, p] = belief.cycle[f]
         if c.pass_by_rank:
             truth.target[f, p] = tactics.keeper_of_rank(w, f, p, memory.pass_rank[f, p])
@@ -291,10 +291,10 @@ def _judge(w, f, p):
 
 @compiled
 def _goes_on_passing(w, f, p):
-    """Does a pass that player p asked for, or went on with, a cycle ago need another kick?
+    """Does a pass that player p asked for, or continued, a cycle ago need another kick?
 
     P keeperWithBall: until the ball has left reach nobody is asked again. A keeper that has lost
-    sight of somebody forgets the pass.
+    sight of a player forgets the pass.
     """
     c, belief = w.constants, w.belief
     if w.memory.pass_cycle[f, p] != belief.cycle[f] - 1 or not belief.ball_kickable[f, p]:

@@ -21,7 +21,7 @@ UNSURE = math.radians(10.0)  # P: nearer to the middle than this it may have gon
 FACED_LATELY = 4  # [cycles] P: its body direction, seen less long ago, tells which
 SAME_BALL = 2.0  # [m] P: an unseen ball is with an opponent so near to it
 HOLDER_RANGE = 4.5  # [m] P: who is unseen too, and no further away
-SAME_PLAYER = 7.5  # [m] P: who is felt so near to where somebody is expected may be that one
+SAME_PLAYER = 7.5  # [m] P: a felt player this near to an expected one may be that one
 SPARE_WAY = 2.0  # [m] P: that it may have made beyond full speed, because of noise
 UNKNOWN_BODY = math.radians(80.0)  # P: -1000 degrees stands for an unknown body direction
 

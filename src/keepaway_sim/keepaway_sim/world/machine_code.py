@@ -3,7 +3,7 @@
 Machine code is kept on disk in a folder named by everything that it was made from: the sources of
 both packages that hold compiled functions, numba, numpy, Python and the processor. So it is never
 stale, whatever time stamps say, and checkouts of the same sources share it. Numba's own cache looks
-at one source file alone, and would go on using code into which an older callee was compiled.
+at one source file alone, and would keep using code into which an older callee was compiled.
 """
 
 from __future__ import annotations

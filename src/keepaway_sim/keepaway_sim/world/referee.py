@@ -8,7 +8,7 @@ from keepaway_sim.world.geometry import length
 from keepaway_sim.world.physics import on_grid
 from keepaway_sim.world.streams import draw
 
-TAKE_CYCLES = 4  # the ball is taken in the cycle after so many with a taker near
+TAKE_CYCLES = 4  # the ball is taken in the cycle after this number with a taker near
 CORNER_JITTER = 3.0  # [m] players start up to so far inward from their corner
 BALL_INSET = 4.0  # [m] the ball starts so far inward from the corner (-x, -y)
 

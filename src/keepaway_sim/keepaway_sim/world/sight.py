@@ -186,7 +186,7 @@ def _velocity_visible(w, f, distance):
 
 @compiled
 def _blended(c, seen_x, seen_y, expected_x, expected_y):
-    """P: mean of seen and expected ball velocity, unless somebody must have touched it."""
+    """P: mean of seen and expected ball velocity, unless a player must have touched it."""
     near = 2.0 * c.ball_rand * length(expected_x, expected_y)
     if abs(seen_x - expected_x) <= near and abs(seen_y - expected_y) <= near:
         return 0.5 * (seen_x + expected_x), 0.5 * (seen_y + expected_y)

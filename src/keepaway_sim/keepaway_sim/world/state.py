@@ -68,11 +68,11 @@ class Memory(NamedTuple):
     seen: np.ndarray  # (F, P, P, 4) another as seen last: x, y [m], vx, vy [m/cycle]
     seen_cycle: np.ndarray  # (F, P, P) int64 cycle in which another was seen or felt last
     motion_cycle: np.ndarray  # (F, P, P + 1) int64 cycle in which its motion was seen last
-    nameless: np.ndarray  # (F, P, P) bool: another was felt last, and may be somebody else
+    nameless: np.ndarray  # (F, P, P) bool: another was felt last, and may be another player
     command: np.ndarray  # (F, P, 3) kind, power, angle of the last command
     turned: np.ndarray  # (F, P) [rad] own turn expected of the last command
     kicked: np.ndarray  # (F, P) bool: the last command kicked the ball
-    pass_cycle: np.ndarray  # (F, P) int64 last cycle in which a pass was asked for or went on
+    pass_cycle: np.ndarray  # (F, P) int64 last cycle in which a pass was asked for or continued
     pass_rank: np.ndarray  # (F, P) int64 its receiver's rank by distance, 0 the closest
     intercept_cycle: np.ndarray  # (F, P) int64 cycle in which the ball is to be met
     intercept_point: np.ndarray  # (F, P, 2) [m] and where
@@ -134,7 +134,7 @@ class Fields(NamedTuple):
 
 
 def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
-    """Fields on which nothing has begun; as many as `bodies` has."""
+    """Fields on which nothing has begun, the number that `bodies` has."""
     num_fields, num_players = len(bodies.place), len(bodies.radius) - 1
     objects = num_players + 1
     return Fields(

@@ -1,7 +1,7 @@
 """Random numbers for compiled loops: one buffered stream of uniforms per numpy Generator.
 
 Compiled code reads ready-made uniforms from an array, so every number still comes from a passed
-`numpy.random.Generator`, and a stream gives the same numbers whoever runs beside it: block
+`numpy.random.Generator`, and a stream gives the same numbers whichever run beside it: block
 sizes do not matter, because `Generator.random(n)` is n times `Generator.random()`.
 """
 
@@ -51,7 +51,7 @@ class RandomStreams:
         self.draws = Draws(
             np.zeros((num_streams, block)), np.full(num_streams, block, dtype=np.int64)
         )
-        self._interval = max(1, block // (4 * reserve))  # looked at every so many calls of `refill`
+        self._interval = max(1, block // (4 * reserve))  # calls of `refill` between two looks
         self._lowest = reserve * self._interval  # numbers that last until the next look
         self._calls_left = 0
         self.latest = block - reserve

@@ -2,7 +2,7 @@
 
 Trials are played in batches (`batch.play_batch`), each a task of a `concurrent.futures.Executor`:
 processes on this machine, or a cluster's through its own executor (Dask's `Client.get_executor`).
-A trial gives the same whatever batch it is in, so a run can be stopped and gone on with anywhere.
+A trial gives the same whatever batch it is in, so a run can be stopped and resumed anywhere.
 """
 
 import time

@@ -3,10 +3,10 @@
 `study.json` holds the settings, the code version and the command; `trials.jsonl` one JSON object a
 line and trial, with every episode's duration. A line is on the disk before the next trial is waited
 for, so that a run can be killed at any moment; half a line is cut off when the folder is opened to
-go on. A folder takes trials of one study only, from one process at a time.
+resume. A folder takes trials of one study only, from one process at a time.
 
 `pack` makes `trials.parquet` of it (`records`): a hundredth of the size, and all that reports need.
-A folder with that file is whole without the other, and a study can go on in it.
+A folder with that file is whole without the other, and a study can be resumed in it.
 """
 
 import fcntl
@@ -44,7 +44,7 @@ class SourceRun:
     task: str
     episodes: int
     cycles: int  # simulated, of 0.1 s
-    keeper: int  # index of the keeper whose weights went on
+    keeper: int  # index of the keeper whose weights were carried over
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ FOLDER = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Stage:
-    """Training before the target task: so many episodes of a smaller one."""
+    """Training before the target task: N episodes of a smaller one."""
 
     task: str  # "3v2"
     episodes: int
@@ -41,7 +41,7 @@ class Row:
     """One line of the study's table: trials that start alike."""
 
     name: str
-    stages: tuple[Stage, ...] = ()  # in order; the weights of one keeper go on to the next
+    stages: tuple[Stage, ...] = ()  # in order; the weights of one keeper are carried to the next
     variant: str = "rho"  # as variants.variant_of reads it, between all stages
     widths: str = ""  # profile of tile widths; empty: the study's
 
@@ -85,7 +85,7 @@ class Study:
     seed: int
     trials: int = 100  # a row
     window: int = 1000  # episodes that the mean duration is over
-    min_hours: float = 0.0  # simulated, of the target task: go on to there after the threshold
+    min_hours: float = 0.0  # simulated, of the target task: played also after the threshold
     max_hours: float = 40.0  # simulated, of the target task: give up, the trial is censored
     greedy_episodes: int = 0  # played without learning or exploring after the target task
     shared_sources: bool = False  # is a row's source run part of that of a row of more episodes?

@@ -24,7 +24,7 @@ UNSEEN_LEAD = 2  # [cycles] P: the start of an opponent who has not been seen mo
 def as_last_seen(w, f, p, j):
     """Player j as player p saw it last, and how many cycles it has had since then.
 
-    P predictNrCyclesToPoint: whoever may be first at the ball is taken to have run for it ever
+    P predictNrCyclesToPoint: a player who may be first at the ball is taken to have run for it ever
     since; who has not been seen moving lately runs straight, and an opponent has a start.
     """
     if j == p:
