@@ -1,7 +1,7 @@
 """Let a whole match run for long, with recorders and a viewer, and watch what its processes use.
 
-    .venv/bin/python scripts/endurance.py --minutes 60
-    .venv/bin/python scripts/endurance.py --minutes 20 --task 5v4 --recorders 2
+    .venv/bin/python scripts/checks/endurance.py --minutes 60
+    .venv/bin/python scripts/checks/endurance.py --minutes 20 --task 5v4 --recorders 2
 
 Memory (resident), file descriptors and threads of every process are sampled. After a warm-up they
 must stay where they are; the table shows the first and the last sample after it. Ends with code 1

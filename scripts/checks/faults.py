@@ -1,6 +1,6 @@
 """Kill and freeze a match's nodes at random moments; check that it continues and nothing is lost.
 
-    .venv/bin/python scripts/faults.py --faults 300
+    .venv/bin/python scripts/checks/faults.py --faults 300
 
 Every process of a recorded, learning match may be hit: SIGKILL ends it, SIGSTOP freezes it for a
 while. `match.py --restart` starts again what was killed. A second simulator (by force) and a node

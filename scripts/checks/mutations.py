@@ -1,4 +1,4 @@
-"""SPLIT from fuzz.py."""
+"""Broken input: valid bytes cut, flipped, repeated or replaced, as hypothesis draws them."""
 
 import math
 import pickle

@@ -12,7 +12,8 @@ from visualization_msgs.msg import MarkerArray
 
 import keepaway_msgs.msg
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.wire.cdr import codec, definition, type_hash
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.wire.definitions import definition, type_hash
 
 TYPES = ["ActionRequest", "AgentStatus", "Episode", "FieldState", "Match", "Perception"]
 REQUEST = codec("keepaway_msgs/msg/ActionRequest")

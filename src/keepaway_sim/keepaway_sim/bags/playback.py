@@ -13,6 +13,7 @@ from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire import cdr
+from keepaway_sim.wire.definitions import type_hash
 from keepaway_sim.wire.messages import SECOND
 
 
@@ -173,7 +174,7 @@ def difference_from_installed(topic: Topic) -> str:
     if not topic.is_ros:
         raise KeepawayError(f"its messages are not ROS 2's ({topic.schema_encoding or 'no type'})")
     installed = cdr.codec(topic.message_type)
-    hash_ = cdr.type_hash(topic.message_type)
+    hash_ = type_hash(topic.message_type)
     try:
         recorded = cdr.Codec(topic.message_type, topic.definition)
     except (ValueError, RecursionError):

@@ -30,7 +30,7 @@ from keepaway_sim.bags.mcap_writer import (
 )
 from keepaway_sim.bags.topics import INFO, Qos, Topic, default_qos
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.wire import cdr
+from keepaway_sim.wire import definitions
 
 
 class BagWriter:
@@ -131,7 +131,8 @@ class BagWriter:
             return
         qos = qos or default_qos(message_type)
         if definition is None:
-            definition, type_hash = cdr.definition(message_type), cdr.type_hash(message_type)
+            definition = definitions.definition(message_type)
+            type_hash = definitions.type_hash(message_type)
         self.copy_topic(Topic(name, message_type, definition, type_hash or "", qos))
 
     def copy_topic(self, topic: Topic) -> None:

@@ -12,45 +12,21 @@ rmw_fastrtps use it; https://mcap.dev/spec/registry for `ros2msg`.
 from __future__ import annotations
 
 import functools
-import json
-import os
-import re
 import struct
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.wire.definitions import PRIMITIVES, Field, definition, parsed, short
 
 HEADER = b"\x00\x01\x00\x00"
 """CDR, little-endian, no options; alignment counts from its end."""
 PAYLOAD = 4  # [bytes] RTPS sends whole words: so padded, messages arrive as they were sent
-_SEPARATOR = "=" * 80
-_SIZES = {
-    "bool": "?", "byte": "B", "char": "B",
-    "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
-    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
-_PRIMITIVES = {name: struct.Struct("<" + code) for name, code in _SIZES.items()}
-_COUNT = _PRIMITIVES["uint32"]
+_COUNT = PRIMITIVES["uint32"]
 _MOST_FIELDS = 10_000
 """Of one message, those of the messages inside it counted in: definitions can nest without end."""
-_FIELD = re.compile(
-    r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?:<=)?(?P<size>\d*)\])?\s+"
-    r"(?P<name>[a-z]\w*)(?:\s+(?P<default>\S.*))?$"
-)
-
-
-class Field(NamedTuple):
-    """One field of a message."""
-
-    name: str
-    type: str  # a primitive, "string", or "package/Name"
-    is_array: bool
-    size: int | None  # of an array of fixed size
 
 
 class Codec:
@@ -68,8 +44,8 @@ class Codec:
             KeepawayError: a text that is no ros2msg definition, or not a whole one.
         """
         self.message_type, self.definition = message_type, definition
-        self._messages = _parse(message_type, definition)
-        self._root = self._messages[_short(message_type)]
+        self._messages = parsed(message_type, definition)
+        self._root = self._messages[short(message_type)]
 
     def encode(self, values: Mapping[str, Any]) -> bytes:
         """The message with these values; what is not named is 0, empty, or the like.
@@ -153,7 +129,7 @@ class Codec:
 
     def _is_fixed(self, field: Field) -> bool:
         """Whether it has the same length in every message, and is not an array of messages."""
-        if field.type in _PRIMITIVES:
+        if field.type in PRIMITIVES:
             return not field.is_array or field.size is not None
         if field.type == "string" or field.is_array:
             return False
@@ -164,7 +140,7 @@ class Codec:
             if field.is_array and field.size is None and field.name not in lengths:
                 yield f"{field.name}.length", "<u4", 4
                 return
-            is_known = field.type in _PRIMITIVES and field.name in lengths
+            is_known = field.type in PRIMITIVES and field.name in lengths
             if not is_known and not self._is_fixed(field):
                 return
             yield from self._leaves([field], "", lengths)
@@ -193,7 +169,7 @@ class Codec:
                 yield name, len(value)
             elif field.type == "string" and not field.is_array:
                 yield name, len(value.encode()) + 1
-            elif field.type not in _PRIMITIVES and not field.is_array:
+            elif field.type not in PRIMITIVES and not field.is_array:
                 yield from self._lengths(self._messages[field.type], f"{name}.", value)
 
     def _write(self, out: bytearray, fields: Sequence[Field], values: Mapping[str, Any]) -> None:
@@ -213,8 +189,8 @@ class Codec:
                 self._write_one(out, field.type, item)
 
     def _write_one(self, out: bytearray, type_: str, value: Any) -> None:
-        if type_ in _PRIMITIVES:
-            _pack(out, _PRIMITIVES[type_], value or 0)
+        if type_ in PRIMITIVES:
+            _pack(out, PRIMITIVES[type_], value or 0)
         elif type_ == "string":
             text = (value or "").encode() + b"\0"
             _pack(out, _COUNT, len(text))
@@ -231,16 +207,16 @@ class Codec:
                 continue
             count = cursor.unpack(_COUNT) if field.size is None else field.size
             cursor.check_count(count)
-            if field.type in _PRIMITIVES:
-                values[field.name] = cursor.unpack_many(_PRIMITIVES[field.type], count)
+            if field.type in PRIMITIVES:
+                values[field.name] = cursor.unpack_many(PRIMITIVES[field.type], count)
             else:
                 values[field.name] = [self._read_one(cursor, field.type) for _ in range(count)]
                 cursor.spend(count)
         return values
 
     def _read_one(self, cursor: _Cursor, type_: str) -> Any:
-        if type_ in _PRIMITIVES:
-            return cursor.unpack(_PRIMITIVES[type_])
+        if type_ in PRIMITIVES:
+            return cursor.unpack(PRIMITIVES[type_])
         if type_ == "string":
             return cursor.string()
         return self._read(cursor, self._messages[type_])
@@ -253,8 +229,8 @@ class Codec:
             name = prefix + field.name
             if field.is_array and field.size is None:
                 yield f"{name}.length", "<u4", 4
-            if field.type in _PRIMITIVES:
-                number = np.dtype("<" + _SIZES[field.type])
+            if field.type in PRIMITIVES:
+                number = np.dtype(PRIMITIVES[field.type].format)
                 size = field.size if field.size is not None else lengths.get(name)
                 if not field.is_array:
                     yield name, number, number.itemsize
@@ -283,107 +259,6 @@ def codec(message_type: str, definition_text: str | None = None) -> Codec:
     (76, 8.4)
     """
     return Codec(message_type, definition_text or definition(message_type))
-
-
-@functools.cache
-def definition(message_type: str) -> str:
-    """The .msg text of a type followed by those of all messages inside it, as MCAP wants them.
-
-    Raises:
-        KeepawayError: a type whose package is not installed.
-    """
-    texts: dict[str, str] = {}
-    waiting = [message_type]
-    while waiting:
-        type_ = waiting.pop(0)
-        if _short(type_) in texts:
-            continue
-        texts[_short(type_)] = _installed(type_, "msg").read_text().rstrip() + "\n"
-        fields = _fields(type_, texts[_short(type_)])
-        waiting += [f.type for f in fields if f.type not in _PRIMITIVES and f.type != "string"]
-    root, *inside = texts.items()
-    return root[1] + "".join(f"{_SEPARATOR}\nMSG: {name}\n{text}" for name, text in inside)
-
-
-@functools.cache
-def type_hash(message_type: str) -> str:
-    """The hash by which ROS 2 tells two versions of a type apart (REP-2011): "RIHS01_..." .
-
-    Raises:
-        KeepawayError: a type whose package is not installed.
-    """
-    described = json.loads(_installed(message_type, "json").read_text())
-    for entry in described["type_hashes"]:
-        if entry["type_name"] == message_type:
-            return str(entry["hash_string"])
-    raise KeepawayError(f"{message_type}: its description has no hash of it")
-
-
-def _installed(message_type: str, suffix: str) -> Path:
-    package, _, name = _short(message_type).partition("/")
-    if not re.fullmatch(r"[a-z]\w*/[A-Z]\w*", f"{package}/{name}"):
-        raise KeepawayError(f"{message_type[:100]!r} is no message's type")
-    prefixes = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
-    for prefix in filter(None, prefixes):
-        path = Path(prefix) / "share" / package / "msg" / f"{name}.{suffix}"
-        if path.is_file():
-            return path
-    raise KeepawayError(
-        f"{message_type}: share/{package}/msg/{name}.{suffix} is in none of {', '.join(prefixes)};"
-        " run scripts/setup"
-    )
-
-
-def _parse(message_type: str, text: str) -> dict[str, list[Field]]:
-    root, *inside = text.split(_SEPARATOR + "\n")
-    messages = {_short(message_type): _fields(message_type, root)}
-    for part in inside:
-        head, _, body = part.partition("\n")
-        if not head.startswith("MSG: "):
-            raise KeepawayError(f"{message_type}: expected 'MSG: package/Name', found {head!r}")
-        name = head.removeprefix("MSG: ").strip()
-        messages[_short(name)] = _fields(name, body)
-    for fields in messages.values():
-        for field in fields:
-            if field.type not in {*_PRIMITIVES, "string", *messages}:
-                raise KeepawayError(f"{message_type}: its definition lacks {field.type}")
-    return messages
-
-
-def _fields(message_type: str, text: str) -> list[Field]:
-    package = _short(message_type).split("/")[0]
-    fields = []
-    for line in text.splitlines():
-        entry = line.partition("#")[0].strip()
-        if not entry or re.match(r"\S+\s+[A-Z][A-Z0-9_]*\s*=", entry):
-            continue  # nothing, or a constant
-        found = _FIELD.match(entry)
-        if not found:
-            raise KeepawayError(f"{message_type}: cannot read {line.strip()!r}")
-        size = _array_size(message_type, found)
-        type_ = _resolved(found["type"], package)
-        fields.append(Field(found["name"], type_, found["array"] is not None, size))
-    return fields
-
-
-def _array_size(message_type: str, found: re.Match[str]) -> int | None:
-    """How many entries an array of fixed size has; None for a sequence, and for no array."""
-    if not found["size"] or "<=" in found["array"]:
-        return None
-    if len(found["size"]) > 9:
-        raise KeepawayError(f"{message_type}: {found['name']} has {found['size'][:9]}.. entries")
-    return int(found["size"])
-
-
-def _resolved(type_: str, package: str) -> str:
-    if type_ in _PRIMITIVES or type_ == "string":
-        return type_
-    return _short(type_) if "/" in type_ else f"{package}/{type_}"
-
-
-def _short(message_type: str) -> str:
-    """For example "keepaway_msgs/Match" of "keepaway_msgs/msg/Match"."""
-    return message_type.replace("/msg/", "/")
 
 
 def _aligned(position: int, size: int) -> int:
