@@ -15,7 +15,6 @@ import itertools
 import json
 import os
 import shlex
-import signal
 import sys
 import time
 from pathlib import Path
@@ -35,15 +34,17 @@ from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.beginning import random_match_id
-from keepaway_sim.match.settings import MatchSettings
+from keepaway_sim.match.settings import MatchSettings, named_texts
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
+from keepaway_sim.ros.running import signals_told
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
 
 SCRIPTS = Path(__file__).resolve().parent
-START_TIMEOUT = 300.0  # [s] for all nodes to come; long because a first start compiles
+COMPILE_TIMEOUT = 1800.0  # [s] for the simulator to be found; a first start compiles before
+START_TIMEOUT = 300.0  # [s] after that, for all players to come; they may compile, too
 END_TIMEOUT = 15.0  # [s] for all nodes to save and end
 MATCH_OPTIONS = (
     *("task", "field", "seed", "speed", "episodes", "answer_timeout"),
@@ -68,10 +69,7 @@ class Member(NamedTuple):
 def main() -> int:
     """Play, say how it went."""
     args = parse()
-    told: list[int] = []
-    for number in SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup stays nohup
-            signal.signal(number, lambda signum, _: told.append(signum))
+    told = signals_told(SIGNALS)
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
@@ -88,6 +86,9 @@ def main() -> int:
     except (AgentError, KeepawayError, MatchError, OSError) as error:
         print(f"match: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:  # StoppedCompiling, where all nodes are in this process
+        print("match: stopped while it compiled", file=sys.stderr)
+        return 128 + told[0]
     finally:
         rclpy.try_shutdown()
     board.conclude()
@@ -132,8 +133,8 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
         for name, player in players.items()
     }
     info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents, allow_nan=False)}
-    settings["record_info"] = json.dumps(info, allow_nan=False)
-    settings["record_attachments"] = json.dumps(weights_at_start(players), allow_nan=False)
+    settings["record_info"] = named_texts(info)
+    settings["record_attachments"] = named_texts(weights_at_start(players))
     return [
         Member("simulator", "simulator", arguments_of("simulator", args, settings)),
         *(
@@ -240,7 +241,8 @@ def play_in_processes(
         }
         for name, command in commands.items():
             processes.start(name, command)
-        started = time.monotonic()
+        until = time.monotonic() + COMPILE_TIMEOUT
+        is_found = False
         while not told and "simulator" in processes.names:
             executor.spin_once(0.1)
             board.show()
@@ -249,8 +251,10 @@ def play_in_processes(
                 if args.restart and code < 0:
                     hear_all(executor)
                     processes.start(name, [*commands[name], *going_on(args, name, board)])
-            if not board.has_begun and time.monotonic() - started > START_TIMEOUT:
-                raise MatchError(f"nothing began within {START_TIMEOUT:.0f} s: {board.state}")
+            if board.figures and not is_found:
+                is_found, until = True, time.monotonic() + START_TIMEOUT
+            if not board.has_begun and time.monotonic() > until:
+                raise MatchError(f"nothing has begun for too long: {board.state}")
         processes.stop(["simulator"], END_TIMEOUT)
         for name in processes.stop(processes.names, END_TIMEOUT):
             print(f"match: {name} did not end and was killed", file=sys.stderr)

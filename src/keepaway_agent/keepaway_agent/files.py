@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from keepaway_agent.errors import AgentError
+
 NO_LINKS: Final = frozenset(
     (errno.EPERM, errno.EACCES, errno.EMLINK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
 )
@@ -55,6 +57,19 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text file, or replace it, in one step."""
     with moved_into_place(path, overwrite=True) as file:
         file.write(text.encode())
+
+
+def path_within(folder: Path, asked: str) -> Path:
+    """The path of a file in a folder; relative ones are taken from there.
+
+    Raises:
+        AgentError: it is elsewhere.
+    """
+    inside = folder.resolve()
+    path = (inside / asked).resolve()
+    if not path.is_relative_to(inside):
+        raise AgentError(f"{asked} is not in {inside}: set weights_dir to a folder above it")
+    return path
 
 
 def name_beside(path: Path) -> Path:

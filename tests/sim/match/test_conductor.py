@@ -9,7 +9,7 @@ import pytest
 
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.beginning import begin_match
-from keepaway_sim.match.conductor import Conductor
+from keepaway_sim.match.conductor import LONG_WAIT, Conductor
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.wire import messages
@@ -45,6 +45,7 @@ class Stage:
         self.published: list[tuple[str, bytes, int]] = []
         self.recorded: list[str] = []
         self.reports: list[str] = []
+        self.warnings: list[str] = []
         self.silent: set[int] = set()
         self.is_lost: Lossy = lambda topic, saying: False
         self.hook: Callable[[], None] = lambda: None
@@ -88,7 +89,11 @@ class Stage:
     def info(self, message: str) -> None:
         self.reports.append(message)
 
-    warning = error = info
+    def warning(self, message: str) -> None:
+        self.info(message)
+        self.warnings.append(message)
+
+    error = warning
 
     # Playing.
 
@@ -169,6 +174,15 @@ def test_nothing_is_played_until_everybody_is_there() -> None:
     stage.arrive(2)
     stage.play()
     assert len(stage.ended()) == 1
+
+
+def test_a_wait_for_players_is_a_warning_only_after_long() -> None:
+    stage = Stage(episodes=1)
+    stage.play(until=lambda: stage.now > LONG_WAIT - 1.0)
+    assert len(stage.reports) > 5
+    assert not stage.warnings
+    stage.play(until=lambda: stage.now > 1.5 * LONG_WAIT)
+    assert len(stage.warnings) == 1
 
 
 def test_who_does_not_answer_is_missing_and_back_from_the_next_kick_off() -> None:

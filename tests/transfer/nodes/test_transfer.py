@@ -25,7 +25,8 @@ def source(tmp_path: Path) -> Path:
 @pytest.fixture
 def ask(graph: Graph, source: Path) -> Callable[..., Any]:
     """Call the node's service, by default for rho from the source to 4v3."""
-    graph.add(TransferNode(context=graph.context))
+    folder = ["--ros-args", "-p", f"weights_dir:={source.parent}"]
+    graph.add(TransferNode(context=graph.context, cli_args=folder, use_global_arguments=False))
 
     def call(**request: object) -> Any:
         wish = {"source_path": str(source), "target_task": "4v3", **request}
@@ -66,12 +67,14 @@ def test_a_mapping_of_ones_own_is_used(
 @pytest.mark.parametrize(
     ("request_", "why"),
     [
-        ({"source_path": "/none.npz"}, "/none.npz cannot be read"),
+        ({"source_path": "none.npz"}, "/none.npz cannot be read"),
+        ({"source_path": "/none.npz"}, "/none.npz is not in "),
         ({"target_task": "four"}, "task='four'"),
         ({"target_task": "2v1"}, "fewer players"),
         ({"variant": "sigma"}, "variant='sigma'"),
         ({"mapping_path": "/none.toml"}, "none.toml"),
-        ({"target_path": "/proc/x.npz"}, "cannot be written"),
+        ({"mapping_path": "/none.toml"}, "/none.toml is not in "),
+        ({"target_path": "../x.npz"}, "set weights_dir to a folder above it"),
     ],
 )
 def test_it_refuses_in_words(ask: Callable[..., Any], request_: dict[str, str], why: str) -> None:

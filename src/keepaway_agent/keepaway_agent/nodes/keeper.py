@@ -7,3 +7,7 @@ from keepaway_agent.nodes import player
 def main(args: list[str] | None = None) -> None:
     """Run one keeper."""
     player.main(Role.KEEPER, args)
+
+
+if __name__ == "__main__":
+    main()

@@ -18,6 +18,7 @@ from rclpy.node import Node
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
+from keepaway_agent.files import path_within
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
 from keepaway_agent.nodes.parameters import declare_settings
@@ -229,11 +230,7 @@ class PlayerNode(Node):
             if self._weights_path is None:
                 raise AgentError("no path was given, and save_weights is not set")
             return self._weights_path
-        folder = Path(self._settings.weights_dir).resolve()
-        path = (folder / asked).resolve()
-        if not path.is_relative_to(folder):
-            raise AgentError(f"{asked} is not in {folder}: set weights_dir to a folder above it")
-        return path
+        return path_within(Path(self._settings.weights_dir), asked)
 
     def _on_save(
         self, request: SaveWeights.Request, response: SaveWeights.Response

@@ -7,3 +7,7 @@ from keepaway_agent.nodes import player
 def main(args: list[str] | None = None) -> None:
     """Run one taker."""
     player.main(Role.TAKER, args)
+
+
+if __name__ == "__main__":
+    main()

@@ -26,6 +26,7 @@ from keepaway_sim.world.world import World
 
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
+LONG_WAIT = 60.0  # [s] a wait for players is a warning only then
 ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another one refuses to play
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 
@@ -121,7 +122,7 @@ class Conductor:
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
-        self._warned_at: dict[str, float] = {}  # [s] by what was warned of
+        self._told_at: dict[str, float] = {}  # [s] by what was told of
         self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
 
     @property
@@ -261,7 +262,7 @@ class Conductor:
             return False
         missing = self.missing()
         if missing:
-            self._warn("missing", f"waits for {missing}", skip_first=True)
+            self._tell_of_waiting(f"waits for {missing}")
         elif not self._has_begun:
             self._begin()
         return not missing
@@ -383,10 +384,25 @@ class Conductor:
             name, f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}"
         )
 
-    def _warn(self, subject: str, text: str, skip_first: bool = False) -> None:
-        """Warn, of one subject at most every `LOG_PERIOD`; with `skip_first` not at once."""
-        now = self._clock()
-        last = self._warned_at.setdefault(subject, now if skip_first else -math.inf)
-        if now - last >= LOG_PERIOD:
-            self._warned_at[subject] = now
+    def _warn(self, subject: str, text: str) -> None:
+        """Warn, of one subject at most every `LOG_PERIOD`."""
+        if self._is_due(subject, LOG_PERIOD):
             self._log.warning(text)
+
+    def _tell_of_waiting(self, text: str) -> None:
+        """Say so every `LOG_PERIOD`, not at once; players come when they come: no trouble yet."""
+        now = self._clock()
+        for subject in ("waiting", "waiting long"):
+            self._told_at.setdefault(subject, now)
+        if self._is_due("waiting long", LONG_WAIT):
+            self._log.warning(text)
+        elif self._is_due("waiting", LOG_PERIOD):
+            self._log.info(text)
+
+    def _is_due(self, subject: str, period: float) -> bool:
+        """Whether a subject was not told of for that long [s]; then it is told of now."""
+        now = self._clock()
+        is_due = now - self._told_at.get(subject, -math.inf) >= period
+        if is_due:
+            self._told_at[subject] = now
+        return is_due

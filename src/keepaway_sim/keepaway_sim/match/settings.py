@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from urllib.parse import parse_qsl, urlencode
+
 import attrs
 
+from keepaway_sim.errors import SettingError
 from keepaway_sim.settings import setting
 
 MOST = 2**63 - 1
@@ -41,12 +45,36 @@ class MatchSettings:
     )
     autostart: bool = setting(True, "kick off when all players are ready")
     record: str = setting("", "folder of a bag to write; empty: none")
-    record_info: str = setting("{}", "JSON object of texts, written into the bag")
-    record_attachments: str = setting("{}", "JSON object, name -> file to put into the bag")
+    record_info: str = setting("", "texts written into the bag: NAME=TEXT&NAME=TEXT, as in a URL")
+    record_attachments: str = setting("", "files put into the bag: NAME=PATH&NAME=PATH")
     wait_for_recorder: bool = setting(
         False, "begin with the recorders' nodes, and play no faster than they follow"
     )
     force: bool = setting(False, "start although another simulator publishes its match here")
+
+
+def named_texts(texts: Mapping[str, str]) -> str:
+    """Texts by name as one parameter; no JSON, which `ros2 param load` cannot read from a text.
+
+    >>> named_texts({"command": "match.py --seed 1"})
+    'command=match.py+--seed+1'
+    """
+    return urlencode(texts)
+
+
+def read_named_texts(name: str, value: str) -> dict[str, str]:
+    """Texts by name from the parameter of that name.
+
+    Raises:
+        SettingError: it is not made like that.
+
+    >>> read_named_texts("record_info", "command=match.py+--seed+1")
+    {'command': 'match.py --seed 1'}
+    """
+    try:
+        return dict(parse_qsl(value, keep_blank_values=True, strict_parsing=bool(value)))
+    except ValueError as error:
+        raise SettingError(f"{name}={value!r}: give NAME=TEXT&NAME=TEXT") from error
 
 
 CHANGEABLE = ("speed", "answer_timeout")

@@ -7,6 +7,7 @@ between. The simulator can wait for it: `recorded` has the simulated time that i
 
 import json
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -249,3 +250,7 @@ def main(args: list[str] | None = None) -> int:
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")
     rclpy.try_shutdown()
     return int(not complete)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

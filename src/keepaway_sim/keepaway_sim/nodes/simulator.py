@@ -6,7 +6,6 @@ It is wiring: `match.conductor` plays the match, this connects it to topics, ser
 from __future__ import annotations
 
 import gc
-import json
 import time
 from collections.abc import Callable
 from functools import partial
@@ -26,7 +25,7 @@ from keepaway_sim.bags.field_recorder import world_info
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
-from keepaway_sim.match.settings import CHANGEABLE, MatchSettings
+from keepaway_sim.match.settings import CHANGEABLE, MatchSettings, read_named_texts
 from keepaway_sim.ros.diagnostics import Troubles, diagnostics, simulator_status
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.publishing import ALL, LATCHED, MATCHES, QUEUE, MatchPublisher
@@ -119,9 +118,11 @@ class Simulator(Node):
     def _open_bag(self, world: World, settings: MatchSettings) -> BagWriter | None:
         if not settings.record:
             return None
-        info = world_info(world, settings.seed, **json.loads(settings.record_info))
+        texts = read_named_texts("record_info", settings.record_info)
+        files = read_named_texts("record_attachments", settings.record_attachments)
+        info = world_info(world, settings.seed, **texts)
         bag = BagWriter(Path(settings.record), info)
-        for name, path in json.loads(settings.record_attachments).items():
+        for name, path in files.items():
             bag.attach(name, Path(path).read_bytes())
         return bag
 
@@ -223,3 +224,7 @@ def _play(is_told_to_end: Callable[[], bool]) -> None:
         simulator.play(lambda timeout: executor.spin_once(timeout), is_told_to_end)
     finally:
         simulator.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -10,7 +10,8 @@ import faulthandler
 import gc
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -20,6 +21,11 @@ from rclpy.utilities import remove_ros_args
 from keepaway_sim.settings import settings_of
 
 LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
+
+
+class StoppedCompiling(KeyboardInterrupt):
+    """A signal came while machine code was made: it is given up at once, as nothing is lost."""
+
 
 Play = Callable[[Callable[[], bool]], None]
 """What a node does, until what it is given says that it is told to end."""
@@ -34,7 +40,7 @@ def run_node(
 ) -> None:
     """Run a node until it is done or told to end (SIGINT, SIGTERM).
 
-    Signals only leave word: nothing is interrupted halfway.
+    Signals only leave word: nothing is interrupted halfway, but for compiling.
 
     Args:
         name: of the node.
@@ -47,18 +53,47 @@ def run_node(
         SystemExit: with one line and exit code 1 where it cannot run; or after `--help`.
     """
     check_arguments(name, settings, sys.argv[1:] if args is None else args)
-    told: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda signum, _: told.append(signum))
+    told = signals_told((signal.SIGINT, signal.SIGTERM))
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         gc.freeze()  # what has been imported stays: no collection looks at it again
         play(lambda: bool(told))
     except (refusal, ParameterException) as error:
         raise SystemExit(f"{name}: {error}") from error
+    except KeyboardInterrupt:  # StoppedCompiling, or what a compiling child makes of a Ctrl-C
+        print(f"{name}: stopped while it compiled", file=sys.stderr)  # noqa: T201
     finally:
         faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
         rclpy.try_shutdown()
+
+
+def signals_told(numbers: Iterable[int]) -> list[int]:
+    """The signals that come from now on, in their order; of those numbers, but for ignored ones.
+
+    They only leave word, and raise nothing; only the first raises `StoppedCompiling` where the
+    program compiles, which may take a minute.
+    """
+    told: list[int] = []
+
+    def leave_word(number: int, frame: FrameType | None) -> None:
+        told.append(number)
+        if len(told) == 1 and _is_compiling(frame):
+            raise StoppedCompiling
+
+    for number in numbers:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup stays nohup
+            signal.signal(number, leave_word)
+    return told
+
+
+def _is_compiling(frame: FrameType | None) -> bool:
+    """Whether `compiled.prepare` waits for machine code, seen from where a signal came in."""
+    while frame:
+        code = frame.f_code
+        if code.co_name == "prepare" and code.co_filename.endswith("compiled.py"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def check_arguments(name: str, settings: Sequence[type], args: Sequence[str]) -> None:

@@ -1,0 +1,51 @@
+"""Signals to a node's program before it plays: while it imports, while it compiles."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+PATIENCE = 60.0  # [s] for a loaded machine; compiling itself takes as long there
+
+
+@contextmanager
+def node(module: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
+    """A node's module as a program."""
+    with subprocess.Popen(
+        [sys.executable, "-m", module],
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def children(pid: int) -> list[str]:
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_simulator_that_compiles(
+    number: signal.Signals, tmp_path: Path, ros_domain: int
+) -> None:
+    with node("keepaway_sim.nodes.simulator", NUMBA_CACHE_DIR=str(tmp_path)) as process:
+        assert process.stderr
+        assert "compiles" in process.stderr.readline()
+        while not children(process.pid):
+            time.sleep(0.05)
+        compilers = children(process.pid)
+        process.send_signal(number)
+        process.send_signal(number)  # a second one does no harm
+        assert process.wait(PATIENCE) == 0
+        assert process.stderr.read() == "simulator: stopped while it compiled\n"
+    assert not [pid for pid in compilers if Path(f"/proc/{pid}").exists()]
