@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from ros_tools_page import MATCH, SECTIONS, Step, page
 
@@ -46,6 +47,34 @@ class ToolsError(Exception):
     """There are no tools, or a command did not do what it should."""
 
 
+class Done(NamedTuple):
+    """What a command did.
+
+    Attributes:
+        step: that was done.
+        code: with which the command ended.
+        text: that it printed.
+    """
+
+    step: Step
+    code: int
+    text: str
+
+    def troubles(self) -> Iterator[str]:
+        """Where that is not what was expected, in words."""
+        if self.code != self.step.code:
+            yield f"{self.step.command}: exit code {self.code}, not {self.step.code}:\n{self.text}"
+        for wanted in self.step.prints:
+            if not re.search(wanted, self.text, re.M):
+                yield f"{self.step.command}: did not print {wanted!r}:\n{self.text}"
+
+    def shortened(self) -> str:
+        """The lines that the page shows."""
+        lines = self.text.splitlines()
+        cut = ["..."] if len(lines) > self.step.lines else []
+        return "\n".join([*lines[: self.step.lines], *cut])
+
+
 def main() -> int:
     """Run every command; print or write the page."""
     args = parse()
@@ -63,7 +92,7 @@ def main() -> int:
 
 
 def run_all(folder: Path, env: Mapping[str, str]) -> list[list[str]]:
-    """What each command of each section prints, while a match is running.
+    """What the page shows of each command, done while a match is running.
 
     Raises:
         ToolsError: a command ends or prints otherwise than expected.
@@ -71,12 +100,14 @@ def run_all(folder: Path, env: Mapping[str, str]) -> list[list[str]]:
     log = folder / "match.txt"
     with running(MATCH.command, log, folder, env) as match:
         wait_for_players(env, folder)
-        outputs = [[run(step, folder, env) for step in section.steps] for section in SECTIONS]
+        done = [[run(step, folder, env) for step in section.steps] for section in SECTIONS]
         match.send_signal(signal.SIGINT)
         code = match.wait(PATIENCE)
-    text = tidy(log.read_text(encoding="utf-8"), folder)
-    check(MATCH, code, text)
-    return [[shortened(MATCH, text)], *outputs]
+    done.insert(0, [Done(MATCH, code, tidy(log.read_text(encoding="utf-8"), folder))])
+    troubles = [trouble for each in done for one in each for trouble in one.troubles()]
+    if troubles:
+        raise ToolsError("\n".join(troubles))
+    return [[one.shortened() for one in each] for each in done]
 
 
 @contextlib.contextmanager
@@ -176,29 +207,10 @@ def shell(
     )
 
 
-def run(step: Step, folder: Path, env: Mapping[str, str]) -> str:
-    """What a command prints, shortened.
-
-    Raises:
-        ToolsError: it ends or prints otherwise than expected.
-    """
+def run(step: Step, folder: Path, env: Mapping[str, str]) -> Done:
+    """Do what a step says."""
     done = shell(step.command, folder, env)
-    text = tidy(done.stdout, folder)
-    check(step, done.returncode, text)
-    return shortened(step, text)
-
-
-def check(step: Step, code: int, text: str) -> None:
-    """Compare what a command did with what is expected.
-
-    Raises:
-        ToolsError: it differs.
-    """
-    if code != step.code:
-        raise ToolsError(f"{step.command}: ended with {code}, not {step.code}:\n{text}")
-    for wanted in step.prints:
-        if not re.search(wanted, text, re.M):
-            raise ToolsError(f"{step.command}: did not print {wanted!r}:\n{text}")
+    return Done(step, done.returncode, tidy(done.stdout, folder))
 
 
 def tidy(text: str, folder: Path) -> str:
@@ -206,15 +218,7 @@ def tidy(text: str, folder: Path) -> str:
     text = re.sub(r"\x1b\[[0-9;]*m", "", text)
     for path, name in ((str(folder), "."), (str(ROOT), "~/keepaway"), (str(Path.home()), "~")):
         text = text.replace(path, name)
-    return text.strip()
-
-
-def shortened(step: Step, text: str) -> str:
-    """The lines of an output that the page shows."""
-    lines = text.splitlines()
-    if len(lines) <= step.lines:
-        return text
-    return "\n".join([*lines[: step.lines], "..."])
+    return text.strip("\n").rstrip()
 
 
 def parse() -> argparse.Namespace:

@@ -86,8 +86,7 @@ SECTIONS = (
     ),
     Section(
         "Rates and delays",
-        "At `speed:=1` a cycle takes 0.1 s, so 10 messages a second pass on every topic of the cycle. Stamps are"
-        " simulated time: `delay` needs it as its clock.",
+        "At `speed:=1` a cycle takes 0.1 s, so 10 messages a second pass on every topic of the cycle.",
         (
             Step(
                 "timeout -s INT 8 ros2 topic hz /field_state",

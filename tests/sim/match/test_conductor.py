@@ -242,6 +242,15 @@ def test_in_real_time_a_cycle_takes_its_time() -> None:
     assert stage.now - then == pytest.approx(40 * 0.1 / 2.0, abs=0.06)
 
 
+@pytest.mark.parametrize("speed", [1.0, 3.0, 20.0])
+def test_markers_are_published_ten_times_a_second(speed: float) -> None:
+    stage = Stage(speed=speed)
+    stage.arrive()
+    stage.play(until=lambda: stage.now > 20.0)
+    markers = [topic for topic, _, _ in stage.published if topic == "markers"]
+    assert len(markers) / stage.now == pytest.approx(10.0, rel=0.05)
+
+
 def test_the_match_waits_for_a_recorder_that_is_behind_but_not_for_ever() -> None:
     stage = Stage(wait_for_recorder=True)
     stage.arrive()
