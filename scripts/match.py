@@ -37,7 +37,7 @@ from keepaway_sim.match.beginning import random_match_id
 from keepaway_sim.match.settings import MatchSettings, named_texts
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
-from keepaway_sim.ros.running import signals_told
+from keepaway_sim.ros.running import received_signals
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
@@ -69,7 +69,7 @@ class Member(NamedTuple):
 def main() -> int:
     """Play, say how it went."""
     args = parse()
-    told = signals_told(SIGNALS)
+    told = received_signals(SIGNALS)
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
@@ -171,6 +171,16 @@ def weights_at_start(players: dict[str, dict[str, object]]) -> dict[str, str]:
         if start:
             files[f"{name}.npz"] = str(start)
     return files
+
+
+def weights_so_far(args: argparse.Namespace) -> dict[str, str]:
+    """The same for a match that continues: what learners have saved last counts."""
+    task = Task.parse(args.task, args.field)
+    players = {
+        name: {**player_settings(args, name, task.role(p)), "resume": True}
+        for p, name in enumerate(task.player_names)
+    }
+    return weights_at_start(players)
 
 
 def arguments_of(name: str, args: argparse.Namespace, settings: dict[str, object]) -> list[str]:
@@ -286,8 +296,14 @@ def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str
     """
     if name != "simulator":
         return ["-p", "resume:=true"]
-    first = ["-p", f"first_episode:={board.next_episode}", "-p", "force:=true"]
-    return [*first, "-p", f"record:={json.dumps(free_folder(args.record), allow_nan=False)}"]
+    changed = {
+        "first_episode": board.next_episode,
+        "force": True,
+        "record": free_folder(args.record),
+        "record_attachments": named_texts(weights_so_far(args)),
+    }
+    pairs = (f"{name}:={json.dumps(value, allow_nan=False)}" for name, value in changed.items())
+    return [word for pair in pairs for word in ("-p", pair)]
 
 
 def free_folder(record: str) -> str:

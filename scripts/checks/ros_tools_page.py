@@ -86,7 +86,7 @@ SECTIONS = (
     ),
     Section(
         "Rates and delays",
-        "At `speed:=1` a cycle takes 0.1 s, so 10 messages a second pass on every topic of the cycle.",
+        "At `speed:=1` a cycle takes 0.1 s, so 10 messages a second pass on every topic of the cycle. Stamps are simulated time: with `-s` `delay` takes `/clock` as its clock.",
         (
             Step(
                 "timeout -s INT 8 ros2 topic hz /field_state",
@@ -97,6 +97,12 @@ SECTIONS = (
             Step(
                 "timeout -s INT 8 ros2 topic hz /markers",
                 (r"average rate: (9\.[5-9]|10\.)",),
+                124,
+                2,
+            ),
+            Step(
+                "timeout -s INT 8 ros2 topic delay -s /field_state",
+                (r"average delay: -?0\.[01]",),
                 124,
                 2,
             ),
@@ -135,9 +141,8 @@ SECTIONS = (
             Step(
                 "ros2 param set /simulator speed -1",
                 (r"out of range Min: 0\.0, Max: 10000\.0, value: -1",),
-                1,
             ),
-            Step("ros2 param set /simulator visible_angle_deg 90", (r"read-only",), 1),
+            Step("ros2 param set /simulator visible_angle_deg 90", (r"read-only",)),
             Step(
                 "ros2 param dump /simulator > simulator.yaml; head -n 5 simulator.yaml",
                 ("ros__parameters:",),
@@ -192,6 +197,26 @@ SECTIONS = (
                 1,
             ),
         ),
+    ),
+    Section(
+        "RViz and Foxglove",
+        "`rviz2 -d $(ros2 pkg prefix --share keepaway_sim)/rviz/keepaway.rviz` shows players and ball from `/markers`;"
+        " `foxglove/keepaway.json` beside it is a layout for Foxglove. Every stamp and marker is in the frame `field`,"
+        " which is RViz's fixed frame there, so no transform is needed, and the simulator publishes none: `tf2_msgs` has"
+        " no wheel. Where a match is part of a larger tree, `ros2 run tf2_ros static_transform_publisher --frame-id map"
+        " --child-frame-id field` joins it.",
+        (),
+    ),
+    Section(
+        "The standard simulation interfaces",
+        "The simulator does not offer the services of `simulation_interfaces`. The package has no wheel; it builds from"
+        " its definitions as `keepaway_msgs` does (version 1.5.1 with `msgs/pyproject.toml` and `msgs/cmake`), but a"
+        " copy of them would have to be kept here. What they ask for and what there is: `SetSimulationState` and"
+        " `GetSimulationState`: `~/start`, `~/pause` and the state in `/diagnostics`; `ResetSimulation` with"
+        " `SCOPE_STATE`: `~/reset`; its `SCOPE_TIME`: nothing, time only goes forward; `StepSimulation`: nothing, a"
+        " match cannot play N cycles and pause; entities: they are the players, read from `/field_state`, and never"
+        " spawned, moved or deleted from outside.",
+        (),
     ),
 )
 

@@ -1,6 +1,7 @@
 """package.xml and imports: what a package imports is named there, and nothing else is."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -39,6 +40,16 @@ def test_what_is_imported_is_declared_once_and_nothing_else(package: str) -> Non
     names = declared(package)
     assert sorted(names) == sorted(set(names))
     assert set(names) == {name.lower() for name in imported(package)}  # as rosdep's keys are
+
+
+def test_the_messages_declare_the_packages_whose_messages_they_use() -> None:
+    msgs = SRC.parent / "msgs"
+    root = ElementTree.parse(msgs / "package.xml").getroot()
+    text = "\n".join(
+        path.read_text() for path in [*msgs.glob("msg/*.msg"), *msgs.glob("srv/*.srv")]
+    )
+    used = set(re.findall(r"^(\w+)/\w+(?:\[\d*\])? ", text, re.M))
+    assert {each.text for each in root.findall("depend")} == used
 
 
 @pytest.mark.parametrize("package", PACKAGES)

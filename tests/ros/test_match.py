@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from graph import Played, played, trained
 
-from keepaway_agent.learning.weights import load_weights
+from keepaway_agent.learning.weights import load_weights, read_weights
 from keepaway_sim.bags.reader import BagReader
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -136,6 +137,24 @@ def test_a_player_that_is_killed_comes_back_with_what_it_saved(tmp_path: Path) -
     # it may be back before its team-mates have gone on without it
     assert saved < load_weights(weights).episodes <= summary["episodes"]
     assert load_weights(tmp_path / "keeper_1.npz").episodes == summary["episodes"]
+
+
+def test_the_bag_of_a_simulator_that_was_started_again_carries_the_weights_of_then(
+    tmp_path: Path,
+) -> None:
+    weights, bag = tmp_path / "weights", tmp_path / "bag"
+    arguments = ["--keeper-policy", "learn", "--save-weights", str(weights), "--record", str(bag)]
+    match = start(*arguments, "--save-every", "2", "--restart")
+    wait_for(lambda: all((weights / f"{keeper}.npz").exists() for keeper in KEEPERS))
+    os.kill(nodes_of(match)["simulator"], signal.SIGKILL)
+    again = tmp_path / "bag_2"
+    wait_for(lambda: any(file.stat().st_size > 100_000 for file in again.glob("*.mcap")))
+    match.send_signal(signal.SIGINT)
+    finish(match)
+    attached = {name: read_weights(BytesIO(data)) for name, data in BagReader(again).attachments()}
+    assert sorted(attached) == [f"{keeper}.npz" for keeper in KEEPERS]
+    for name, known in attached.items():
+        assert 0 < known.episodes < load_weights(weights / name).episodes
 
 
 def test_a_player_that_does_not_come_is_named() -> None:

@@ -70,7 +70,7 @@ def declare_settings(
 
 
 def descriptor(declared: Setting, read_only: bool = True) -> ParameterDescriptor:
-    """What ROS is told of a setting: type, description, unit, range."""
+    """A setting as ROS describes it: type, description, unit, range."""
     unit = f" [{declared.unit}]" if declared.unit else ""
     made = ParameterDescriptor(
         name=declared.name,

@@ -32,7 +32,7 @@ from keepaway_msgs.srv import LoadWeights, SaveWeights
 ANNOUNCEMENT_PERIOD = (
     0.5  # [s] a first message may be lost although the nodes have found each other
 )
-PATIENCE = 0.25  # [s] at most, from being told to end to ending
+PATIENCE = 0.25  # [s] at most, from the signal to the end
 LOG_PERIOD = 5.0  # [s] the same complaint is not made more often
 
 
@@ -116,7 +116,7 @@ class PlayerNode(Node):
         return load_weights(own)
 
     def _on_match(self, match: Match) -> None:
-        """Join a new match, but no other one while the own one's simulator is there."""
+        """Join a new match, but no other one while its own match's simulator publishes."""
         wanted = self._settings.match_id
         is_another = self._match_id not in (0, match.match_id)
         if wanted and match.match_id != wanted:
@@ -262,7 +262,7 @@ class PlayerNode(Node):
 
 
 def main(role: Role, args: list[str] | None = None) -> None:
-    """Run one player until it is told to end (SIGINT, SIGTERM); then its weights are saved.
+    """Run one player until a signal asks it to end (SIGINT, SIGTERM); then its weights are saved.
 
     Raises:
         SystemExit: it cannot play.

@@ -28,7 +28,7 @@ class StoppedCompiling(KeyboardInterrupt):
 
 
 Play = Callable[[Callable[[], bool]], None]
-"""What a node does, until what it is given says that it is told to end."""
+"""What a node does, until the function that it is given returns true: it should end."""
 
 
 def run_node(
@@ -38,9 +38,9 @@ def run_node(
     refusal: type[Exception],
     args: list[str] | None = None,
 ) -> None:
-    """Run a node until it is done or told to end (SIGINT, SIGTERM).
+    """Run a node until it has finished or a signal asks it to end (SIGINT, SIGTERM).
 
-    Signals only leave word: nothing is interrupted halfway, but for compiling.
+    Signals are only noted: nothing is interrupted halfway, but for compiling.
 
     Args:
         name: of the node.
@@ -53,11 +53,11 @@ def run_node(
         SystemExit: with one line and exit code 1 where it cannot run; or after `--help`.
     """
     check_arguments(name, settings, sys.argv[1:] if args is None else args)
-    told = signals_told((signal.SIGINT, signal.SIGTERM))
+    received = received_signals((signal.SIGINT, signal.SIGTERM))
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         gc.freeze()  # what has been imported stays: no collection looks at it again
-        play(lambda: bool(told))
+        play(lambda: bool(received))
     except (refusal, ParameterException) as error:
         raise SystemExit(f"{name}: {error}") from error
     except KeyboardInterrupt:  # StoppedCompiling, or what a compiling child makes of a Ctrl-C
@@ -67,23 +67,23 @@ def run_node(
         rclpy.try_shutdown()
 
 
-def signals_told(numbers: Iterable[int]) -> list[int]:
+def received_signals(numbers: Iterable[int]) -> list[int]:
     """The signals that come from now on, in their order; of those numbers, but for ignored ones.
 
-    They only leave word, and raise nothing; only the first raises `StoppedCompiling` where the
+    They are noted and raise nothing; only the first raises `StoppedCompiling` where the
     program compiles, which may take a minute.
     """
-    told: list[int] = []
+    received: list[int] = []
 
-    def leave_word(number: int, frame: FrameType | None) -> None:
-        told.append(number)
-        if len(told) == 1 and _is_compiling(frame):
+    def note(number: int, frame: FrameType | None) -> None:
+        received.append(number)
+        if len(received) == 1 and _is_compiling(frame):
             raise StoppedCompiling
 
     for number in numbers:
         if signal.getsignal(number) is not signal.SIG_IGN:  # nohup stays nohup
-            signal.signal(number, leave_word)
-    return told
+            signal.signal(number, note)
+    return received
 
 
 def _is_compiling(frame: FrameType | None) -> bool:

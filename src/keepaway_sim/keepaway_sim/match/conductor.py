@@ -122,7 +122,7 @@ class Conductor:
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
-        self._told_at: dict[str, float] = {}  # [s] by what was told of
+        self._reported_at: dict[str, float] = {}  # [s] by what was reported
         self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
 
     @property
@@ -262,7 +262,7 @@ class Conductor:
             return False
         missing = self.missing()
         if missing:
-            self._tell_of_waiting(f"waits for {missing}")
+            self._report_waiting(f"waits for {missing}")
         elif not self._has_begun:
             self._begin()
         return not missing
@@ -389,20 +389,20 @@ class Conductor:
         if self._is_due(subject, LOG_PERIOD):
             self._log.warning(text)
 
-    def _tell_of_waiting(self, text: str) -> None:
-        """Say so every `LOG_PERIOD`, not at once; players come when they come: no trouble yet."""
+    def _report_waiting(self, text: str) -> None:
+        """Report it every `LOG_PERIOD`, not at once; it is a warning only after `LONG_WAIT`."""
         now = self._clock()
         for subject in ("waiting", "waiting long"):
-            self._told_at.setdefault(subject, now)
+            self._reported_at.setdefault(subject, now)
         if self._is_due("waiting long", LONG_WAIT):
             self._log.warning(text)
         elif self._is_due("waiting", LOG_PERIOD):
             self._log.info(text)
 
     def _is_due(self, subject: str, period: float) -> bool:
-        """Whether a subject was not told of for that long [s]; then it is told of now."""
+        """Whether a subject was last reported that long ago [s]; if so, it is reported now."""
         now = self._clock()
-        is_due = now - self._told_at.get(subject, -math.inf) >= period
+        is_due = now - self._reported_at.get(subject, -math.inf) >= period
         if is_due:
-            self._told_at[subject] = now
+            self._reported_at[subject] = now
         return is_due

@@ -106,7 +106,7 @@ class Recorder(Node):
         """Begin the bag and listen to the match; to its players once it has named them.
 
         Raises:
-            KeepawayError: no path was given, or something is there.
+            KeepawayError: no path was given, or its folder exists.
         """
         super().__init__("recorder", **node_options)
         self.settings = declare_settings(self, RecorderSettings)
@@ -184,7 +184,7 @@ class Recorder(Node):
         if topic in self._subscriptions_by_topic:
             return
         qos = default_qos(message_type)
-        if message_type == EPISODE:  # older bags offer it volatile, and what was before is over
+        if message_type == EPISODE:  # older bags offer it volatile, and earlier episodes have ended
             qos = qos._replace(transient_local=False)
         profile = to_profile(qos, self.settings.history)
         subscription = listen(self, topic, message_type, profile)

@@ -196,9 +196,11 @@ class Replayer(Node):
     def _await_subscribers(self, spin: Callable[[float], None]) -> None:
         begin = time.monotonic()
         while rclpy.ok(context=self.context):
-            heard = sum(p.get_subscription_count() > 0 for p in self._publishers_by_topic.values())
+            subscribed = sum(
+                p.get_subscription_count() > 0 for p in self._publishers_by_topic.values()
+            )
             left = begin + self.settings.start_delay - time.monotonic()
-            if heard >= self.settings.wait_for_subscribers and left <= 0:
+            if subscribed >= self.settings.wait_for_subscribers and left <= 0:
                 return
             spin(min(LONGEST_SPIN, max(left, 0.01)))
 

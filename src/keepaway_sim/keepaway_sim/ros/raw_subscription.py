@@ -65,23 +65,23 @@ _RCUTILS.rcutils_uint8_array_fini.argtypes = [ctypes.POINTER(_Bytes)]
 
 
 class RawSubscription(Waitable):
-    """Hears one topic for as long as its node lives."""
+    """Subscribes to one topic for as long as its node lives."""
 
     def __init__(
         self,
         node: Node,
         message_class: type[Any],
         topic: str,
-        hear: Callable[[bytes, bytes], None],
+        on_message: Callable[[bytes, bytes], None],
         qos: QoSProfile,
     ) -> None:
-        """Listen.
+        """Subscribe.
 
         Args:
-            node: that listens.
+            node: that subscribes.
             message_class: of the topic's messages.
             topic: its name, relative to the node's namespace.
-            hear: called with a message's bytes and its publisher's identity (`GID_SIZE` bytes).
+            on_message: called with a message's bytes and its publisher's identity.
             qos: of the subscription.
         """
         super().__init__(node.default_callback_group)
@@ -91,7 +91,7 @@ class RawSubscription(Waitable):
             self._subscription = _rclpy.Subscription(
                 node.handle, message_class, name, qos.get_c_qos_profile()
             )
-        self._hear, self._is_open = hear, True
+        self._on_message, self._is_open = on_message, True
         self._place = 0  # in the wait set
         self._bytes = _Bytes(allocator=_RCUTILS.rcutils_get_default_allocator())
         self._info = _MessageInfo()
@@ -125,8 +125,8 @@ class RawSubscription(Waitable):
         """
         if self._is_open and wait_set.is_ready("subscription", self._place):
             taken = self._take()
-            if taken is not None:  # the executor may have been told of it in vain
-                self._hear(*taken)
+            if taken is not None:  # the executor may report a message that is gone
+                self._on_message(*taken)
         return False
 
     def _take(self) -> tuple[bytes, bytes] | None:
@@ -146,7 +146,7 @@ class RawSubscription(Waitable):
         """Never called, as it is never ready."""
 
     def destroy(self) -> None:
-        """Listen no longer, whatever an executor still has in hand."""
+        """Unsubscribe, whatever an executor still has in hand."""
         self._is_open = False
         self._subscription.destroy_when_not_in_use()
         _RCUTILS.rcutils_uint8_array_fini(self._bytes)

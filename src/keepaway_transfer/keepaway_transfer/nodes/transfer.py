@@ -26,7 +26,7 @@ from keepaway_sim.settings import setting
 from keepaway_transfer.mapping import load_mapping
 from keepaway_transfer.rho import Transfer, transferred
 
-SPIN_TIMEOUT = 0.25  # [s] at most, from being told to end to ending
+SPIN_TIMEOUT = 0.25  # [s] at most, from the signal to the end
 
 
 @attrs.frozen
@@ -87,7 +87,7 @@ def apply(request: ApplyRho.Request, folder: Path) -> tuple[str, str]:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Serve until told to end (SIGINT, SIGTERM).
+    """Serve until a signal asks it to end (SIGINT, SIGTERM).
 
     Raises:
         SystemExit: it cannot serve.
