@@ -24,7 +24,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -42,6 +42,7 @@ _CHECKED: Final = os.environ.get("KEEPAWAY_CHECKED") == "1"
 _PATIENCE: Final = 0.05  # [s] between two looks at what is waited for
 _PROGRESS_PERIOD: Final = 5.0  # [s] between two reports
 _LOG = logging.getLogger(__name__)
+_POSTPONED: list[list[Job]] = []  # what `prepare` did not compile, while it is postponed
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -90,11 +91,11 @@ class Kernel:
             self.compile_for(*arguments)
         return self._code(*self._frozen, *arguments)  # type: ignore[misc]
 
-    def _job(self, arguments: tuple[Any, ...]) -> _Job:
+    def _job(self, arguments: tuple[Any, ...]) -> Job:
         types = tuple(typeof(value) for value in (*self._frozen, *arguments))
-        return _Job(self._function, types)
+        return Job(self._function, types)
 
-    def _load(self, job: _Job) -> None:
+    def _load(self, job: Job) -> None:
         code = self._function.compile(job.types)
         self._code = self._code or code
 
@@ -115,12 +116,25 @@ def prepare(*calls: tuple[Kernel, tuple[Any, ...]]) -> None:
             kernel._code = kernel._function
         return
     jobs = [(kernel, kernel._job(arguments)) for kernel, arguments in calls]
-    _make([job for _, job in jobs if not job.is_made()])
+    if _POSTPONED:
+        _POSTPONED[-1].extend(job for _, job in jobs)
+        return
+    make([job for _, job in jobs])
     for kernel, job in jobs:
         kernel._load(job)
 
 
-class _Job(NamedTuple):
+@contextlib.contextmanager
+def postponed() -> Iterator[list[Job]]:
+    """Let `prepare` only list what it would compile, so that `make` can do it side by side."""
+    _POSTPONED.append([])
+    try:
+        yield _POSTPONED[-1]
+    finally:
+        _POSTPONED.pop()
+
+
+class Job(NamedTuple):
     """A function to compile for arguments of some types."""
 
     function: Any  # a dispatcher
@@ -161,8 +175,13 @@ def _child() -> None:
     getattr(function, "entry", function).compile(types)
 
 
-def _make(jobs: list[_Job]) -> None:
-    """Compile what is on no disk yet; it is compiled here where there is no place to keep it."""
+def make(wanted: Iterable[Job]) -> None:
+    """Compile what is on no disk yet; it is compiled here where there is no place to keep it.
+
+    Raises:
+        RuntimeError: a function cannot be compiled.
+    """
+    jobs = [job for job in dict.fromkeys(wanted) if not job.is_made()]
     if not jobs:
         return
     names = ", ".join(job.function.py_func.__name__ for job in jobs)
@@ -178,7 +197,7 @@ def _make(jobs: list[_Job]) -> None:
     _LOG.warning("compiled %s in %.0f s", names, time.monotonic() - start)
 
 
-def _run_children(waiting: list[_Job], start: float) -> None:
+def _run_children(waiting: list[Job], start: float) -> None:
     """Compile in child processes; none of them outlives this."""
     running: list[subprocess.Popen[bytes]] = []
     num, said = len(waiting), time.monotonic()
