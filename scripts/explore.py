@@ -35,6 +35,8 @@ try:
     courses = dict(bag.tracks(list(bag.episodes())))
 except (KeepawayError, StudyError, OSError) as error:
     sys.exit(f"explore: {error}")
+if not courses:
+    sys.exit(f"explore: {args.bag}: no finished episode")
 num_keepers = bag.task.num_keepers
 
 # %% The bag: a row for each episode

@@ -28,7 +28,7 @@ from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
 
 Play = Callable[[int], int]
-"""Plays at least so many cycles a field; how many they were, of all fields."""
+"""Plays at least N cycles on each field; returns the number of cycles of all fields."""
 
 
 def trainer(num_fields: int, policy: str = "random") -> Play:

@@ -1,4 +1,4 @@
-"""Everything that matches, training and environments call is compiled ahead."""
+"""Everything that matches and training call is compiled ahead."""
 
 from __future__ import annotations
 
