@@ -74,3 +74,16 @@ def test_a_snapshot_that_does_not_fit_is_refused():
     streams.seed(0, np.random.default_rng(3))
     with pytest.raises(KeepawayError, match="32 numbers: there is room for 16"):
         RandomStreams(1, reserve=4, block=16).restore(0, streams.snapshot(0))
+
+
+def test_who_watches_the_cursors_never_runs_dry():
+    streams = RandomStreams(1, reserve=4, block=16)
+    streams.seed(0, np.random.default_rng(5))
+    drawn, num_looks = [], 0
+    for _ in range(40):
+        if streams.draws.cursor[0] > streams.latest:
+            streams.top_up()
+            num_looks += 1
+        drawn += [draw(streams.draws, 0) for _ in range(4)]
+    np.testing.assert_array_equal(drawn, np.random.default_rng(5).random(len(drawn)))
+    assert num_looks == 9  # every fourth time, but for the first block
