@@ -53,6 +53,23 @@ def test_holding_in_every_field_gives_the_trainers_episodes(task: str) -> None:
     assert [field[:4] for field in ends] == durations("hold", task)
 
 
+def test_a_field_plays_the_same_whether_a_step_waits_for_all_or_for_any() -> None:
+    """Choices go by the field's own count of them; waiting moves them to another step only."""
+    played: dict[str, list[list[tuple[int, int]]]] = {}
+    for wait_for in ("all", "any"):
+        env = KeeperVectorEnv(4, wait_for=wait_for)
+        _, infos = env.reset(seed=6)
+        made, fields = np.zeros(4, dtype=np.int64), [[(0, 0)] for _ in range(4)]
+        while min(map(len, fields)) < 60:
+            actions = (made * np.arange(1, 5)) % 3
+            made += infos["choosing"]
+            _, rewards, ended, _, infos = env.step(actions)
+            for field in np.flatnonzero(infos["choosing"] | ended):
+                fields[field].append((int(rewards[field]), int(infos["cycle"][field])))
+        played[wait_for] = [field[:60] for field in fields]
+    assert played["all"] == played["any"]
+
+
 def test_many_fields_at_once_equal_each_alone() -> None:
     """Field 0 of many is the only field of one, whatever is chosen beside it."""
     many, one = KeeperVectorEnv(5), KeeperEnv()
