@@ -252,3 +252,37 @@ def test_calls_may_be_checked_or_not_compiled(
         check=True,
     )
     assert done.stdout.strip() == expected
+
+
+TOGETHER = """
+from keepaway_agent import compiled as agent
+from keepaway_agent.learning import caller
+from keepaway_sim.world import compiled as sim, caller as world
+with sim.postponed() as of_world, agent.postponed() as of_agents:
+    agent.Kernel(caller.ask).compile_for()
+    agent.Kernel(caller.ask).compile_for()
+    sim.Kernel(world.ask).compile_for()
+for _ in range(2):
+    agent.make([*of_world, *of_agents])
+"""
+
+
+def test_functions_of_both_packages_are_compiled_side_by_side_and_once(checkout: Checkout) -> None:
+    command = [sys.executable, "-c", TOGETHER]
+    done = subprocess.run(
+        command, env=checkout.env, cwd="/", capture_output=True, text=True, check=True
+    )
+    said = [line for line in done.stderr.splitlines() if line.startswith("compiles ")]
+    assert said == ["compiles ask, ask: once for these sources, up to a minute"]
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_coverage_is_imported_only_where_it_measures(before: bool) -> None:
+    """It takes a seventh of the time that a node's imports take, and can be imported later."""
+    first = "import coverage; " if before else ""
+    code = f"{first}import sys, keepaway_agent.compiled; print('coverage' in sys.modules)"
+    again = "; import coverage; from numba.misc import coverage_support as numbas"
+    shown = "; print(numbas.coverage_available, coverage.__name__)"
+    command = [sys.executable, "-c", code + again + shown]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [str(before), str(before), "coverage"]

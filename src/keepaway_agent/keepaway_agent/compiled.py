@@ -28,6 +28,11 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+if "coverage" not in sys.modules:  # numba imports it unused: a seventh of a node's imports
+    sys.modules["coverage"] = None  # type: ignore[assignment]
+    import numba  # noqa: F401
+
+    del sys.modules["coverage"]
 from numba import config, njit, typeof
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
