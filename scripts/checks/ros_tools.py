@@ -214,9 +214,14 @@ def run(step: Step, folder: Path, env: Mapping[str, str]) -> Done:
 
 
 def tidy(text: str, folder: Path) -> str:
-    """An output without what is only of this machine: colours, folders."""
+    """An output without what is only of this machine: colours, folders, what was killed."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", text)
-    for path, name in ((str(folder), "."), (str(ROOT), "~/keepaway"), (str(Path.home()), "~")):
+    text = re.sub(r"^.*\[RTPS_TRANSPORT_SHM Error\].*\n", "", text, flags=re.M)
+    for path, name in (
+        (str(folder), "~/match"),
+        (str(ROOT), "~/keepaway"),
+        (str(Path.home()), "~"),
+    ):
         text = text.replace(path, name)
     return text.strip("\n").rstrip()
 

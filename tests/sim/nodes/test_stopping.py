@@ -15,10 +15,10 @@ PATIENCE = 60.0  # [s] for a loaded machine; compiling itself takes as long ther
 
 
 @contextmanager
-def node(module: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
+def node(module: str, *arguments: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
     """A node's module as a program."""
     with subprocess.Popen(
-        [sys.executable, "-m", module],
+        [sys.executable, "-m", module, *arguments],
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -49,3 +49,24 @@ def test_a_signal_ends_a_simulator_that_compiles(
         assert process.wait(PATIENCE) == 0
         assert process.stderr.read() == "simulator: stopped while it compiled\n"
     assert not [pid for pid in compilers if Path(f"/proc/{pid}").exists()]
+
+
+@pytest.mark.parametrize("module", ["keepaway_sim.nodes.recorder", "keepaway_agent.nodes.keeper"])
+def test_a_signal_while_it_imports_is_one_line(module: str) -> None:
+    with node(module) as process:
+        while "multiarray" not in Path(f"/proc/{process.pid}/maps").read_text():
+            time.sleep(0.01)  # numpy comes first, much more after it
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 130
+        assert process.stderr
+        assert process.stderr.read() == f"{module.rpartition('.')[2]}: stopped\n"
+
+
+@pytest.mark.parametrize(
+    "module", ["sim.nodes.simulator", "agent.nodes.taker", "transfer.nodes.transfer"]
+)
+def test_a_nodes_module_is_a_program(module: str) -> None:
+    with node(f"keepaway_{module}", "--help") as process:
+        assert process.stdout
+        assert process.stdout.read().startswith(f"usage: {module.rpartition('.')[2]}")
+        assert process.wait(PATIENCE) == 0
