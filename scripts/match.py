@@ -37,7 +37,7 @@ from keepaway_sim.match.beginning import random_match_id
 from keepaway_sim.match.settings import MatchSettings, named_texts
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
-from keepaway_sim.ros.running import received_signals
+from keepaway_sim.ros.running import ignore_signals, received_signals
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
@@ -93,6 +93,7 @@ def main() -> int:
         rclpy.try_shutdown()
     board.conclude()
     report(args, board.summary())
+    ignore_signals(SIGNALS)
     return 128 + told[0] if told else 0  # as shells expect it: 130 after Ctrl-C
 
 

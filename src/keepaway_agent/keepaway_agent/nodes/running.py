@@ -10,7 +10,7 @@ import faulthandler
 import gc
 import signal
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from types import FrameType
 
 import rclpy
@@ -20,6 +20,7 @@ from rclpy.utilities import remove_ros_args
 
 from keepaway_agent.settings import settings_of
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 LONGEST_EXIT = 15.0  # [s] the middleware's own end was once seen to hang
 
 
@@ -53,7 +54,7 @@ def run_node(
         SystemExit: with one line and exit code 1 where it cannot run; or after `--help`.
     """
     check_arguments(name, settings, sys.argv[1:] if args is None else args)
-    received = received_signals((signal.SIGINT, signal.SIGTERM))
+    received = received_signals(_SIGNALS)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         gc.freeze()  # what has been imported stays: no collection looks at it again
@@ -65,9 +66,10 @@ def run_node(
     finally:
         faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
         rclpy.try_shutdown()
+        ignore_signals(_SIGNALS)
 
 
-def received_signals(numbers: Iterable[int]) -> list[int]:
+def received_signals(numbers: Collection[int]) -> list[int]:
     """The signals that come from now on, in their order; of those numbers, but for ignored ones.
 
     They are noted and raise nothing; only the first raises `StoppedCompiling` where the
@@ -78,12 +80,19 @@ def received_signals(numbers: Iterable[int]) -> list[int]:
     def note(number: int, frame: FrameType | None) -> None:
         received.append(number)
         if len(received) == 1 and _is_compiling(frame):
+            ignore_signals(numbers)
             raise StoppedCompiling
 
     for number in numbers:
         if signal.getsignal(number) is not signal.SIG_IGN:  # nohup stays nohup
             signal.signal(number, note)
     return received
+
+
+def ignore_signals(numbers: Iterable[int]) -> None:
+    """Let a program that is ending end; Python itself would let its last moments be cut short."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _is_compiling(frame: FrameType | None) -> bool:
