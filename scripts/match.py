@@ -284,10 +284,10 @@ def judge_end(name: str, code: int, board: Scoreboard, restart: bool) -> None:
     if is_simulator and not code:
         return
     if not board.has_begun:
-        raise MatchError(f"{name} is missing: its process ended with code {code}")
+        raise MatchError(f"{name} did not join: its process ended with code {code}")
     if is_simulator and not (restart and was_killed):
         raise MatchError(f"the simulator ended with code {code}")
-    print(f"match: {name} ended with code {code}; it is missing now", file=sys.stderr)
+    print(f"match: {name} ended with code {code}; the match continues without it", file=sys.stderr)
 
 
 def going_on(args: argparse.Namespace, name: str, board: Scoreboard) -> list[str]:

@@ -98,7 +98,7 @@ def run_all(folder: Path, env: Mapping[str, str]) -> list[list[str]]:
         ToolsError: a command ends or prints otherwise than expected.
     """
     log = folder / "match.txt"
-    with running(MATCH.command, log, folder, env) as match:
+    with running(f"exec {MATCH.command}", log, folder, env) as match:
         wait_for_players(env, folder)
         done = [[run(step, folder, env) for step in section.steps] for section in SECTIONS]
         match.send_signal(signal.SIGINT)
@@ -161,7 +161,7 @@ def running(
     """A command that runs beside others, in a session of its own, its output in a file."""
     with log.open("wb") as output:
         process = subprocess.Popen(
-            ["bash", "-c", f"exec {command}"],
+            ["bash", "-c", command],
             cwd=folder,
             env=env,
             stdout=output,
@@ -185,26 +185,20 @@ def wait_for_players(env: Mapping[str, str], folder: Path, namespace: str = "") 
     until = time.monotonic() + PATIENCE
     command = f"ros2 topic echo --once {namespace}/field_state keepaway_msgs/msg/FieldState"
     while time.monotonic() < until:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            if shell(command, folder, env, timeout=20.0).returncode == 0:
-                return
+        if shell(command, folder, env, timeout=20.0).returncode == 0:
+            return
     raise ToolsError(f"nobody plays after {PATIENCE:.0f} s")
 
 
 def shell(
     command: str, folder: Path, env: Mapping[str, str], timeout: float = PATIENCE
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command as a person does, in a folder."""
-    return subprocess.run(
-        ["bash", "-c", command],
-        cwd=folder,
-        env=env,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=timeout,
-        check=False,
-    )
+    """Run a command as a person does, in a folder; what takes too long is ended (code 143)."""
+    log = folder / "output.txt"
+    is_late = contextlib.suppress(subprocess.TimeoutExpired)
+    with running(command, log, folder, env) as process, is_late:
+        process.wait(timeout)
+    return subprocess.CompletedProcess(command, process.wait(), log.read_text(encoding="utf-8"))
 
 
 def run(step: Step, folder: Path, env: Mapping[str, str]) -> Done:

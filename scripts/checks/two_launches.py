@@ -24,8 +24,8 @@ from ros_tools import PATIENCE, ToolsError, environment, running, shell, wait_fo
 from ros_tools_page import PLAYERS
 
 LAUNCH = "ros2 launch keepaway_transfer match.launch.py"
-FIRST = f"{LAUNCH} namespace:=/a speed:=1"
-SECOND = f"{LAUNCH} namespace:=/b episodes:=40 speed:=0"
+FIRST = f"exec {LAUNCH} namespace:=/a speed:=1"
+SECOND = f"exec {LAUNCH} namespace:=/b episodes:=40 speed:=0"
 NODES = ("simulator", *PLAYERS)
 WRONG = {"speed": "fast", "task": "three", "profile": "1999", "params_file": "/none.yaml"}
 

@@ -185,13 +185,13 @@ def test_a_wait_for_players_is_a_warning_only_after_long() -> None:
     assert len(stage.warnings) == 1
 
 
-def test_who_does_not_answer_is_missing_and_back_from_the_next_kick_off() -> None:
+def test_who_does_not_answer_times_out_and_is_back_from_the_next_kick_off() -> None:
     stage = Stage(episodes=2)
     stage.arrive()
     stage.silent = {1}
     stage.play(until=lambda: stage.match.num_cycles > 5)
     assert stage.match.state() == "plays without keeper_2"
-    assert [text for text in stage.reports if text.startswith("keeper_2 is missing")]
+    assert [text for text in stage.reports if text.startswith("keeper_2 timed out")]
     assert stage.now == pytest.approx(TIMEOUT, abs=0.5)  # it was waited for once
     stage.silent = set()
     stage.play(until=lambda: stage.match.num_finished == 1)
@@ -303,6 +303,18 @@ def test_a_simulator_that_finds_another_one_refuses_to_play() -> None:
     with pytest.raises(KeepawayError, match=r"another simulator .* \(4v3\): choose .* force:=true"):
         stage.play()
     assert stage.match.num_cycles == 0
+
+
+def test_a_second_simulator_with_the_number_of_the_match_is_another_one() -> None:
+    stage = Stage(episodes=1)
+    stage.arrive()
+    data = codec(messages.MATCH).encode({"task": "3v2", "match_id": stage.match.match_id})
+    stage.match.take_match(data, b"itself")
+    stage.match.take_match(data, b"itself")
+    assert stage.match.state() == "plays"
+    stage.match.take_match(data, b"a copy started with its parameters")
+    with pytest.raises(KeepawayError, match=r"another simulator .* \(3v2\): choose"):
+        stage.play()
 
 
 @pytest.mark.parametrize("is_forced", [True, False])

@@ -119,6 +119,7 @@ class Conductor:
         self._messages = FieldMessages(world, match_id=self.match_id)
         self._is_reset = self._has_begun = False
         self._arrived_at, self._refusal = clock(), ""
+        self._publishers_of_match: set[bytes] = set()  # of this one, by their identities
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
@@ -201,7 +202,9 @@ class Conductor:
             self._warn("match", f"match: ignored: {error}")
             return
         if other["match_id"] == self.match_id:
-            return
+            self._publishers_of_match.add(sender)
+            if len(self._publishers_of_match) == 1:  # itself
+                return
         found = f"another simulator publishes `match` here ({other['task']})"
         has_just_come = self._clock() - self._arrived_at < ARRIVAL and not self._has_begun
         if has_just_come and not self.settings.force:
@@ -339,7 +342,7 @@ class Conductor:
         timeout, seen = self.settings.answer_timeout, self.world.belief
         for name in self.roster.time_out(now, timeout):
             self._log.error(
-                f"{name} is missing: no answer for {timeout} s, episode {seen.episode[0]} cycle"
+                f"{name} timed out: no answer for {timeout} s, episode {seen.episode[0]} cycle"
                 f" {seen.cycle[0]}; it does the default until it comes back"
             )
         for player in self.roster.unanswered(now - RESEND_PERIOD):

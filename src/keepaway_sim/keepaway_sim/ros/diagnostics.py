@@ -87,7 +87,7 @@ def _of_player(
     namespace: str, seat: Seat, num_answering: int, has_trouble: bool
 ) -> DiagnosticStatus:
     if not seat.present:
-        level, message = DiagnosticStatus.ERROR, "missing"
+        level, message = DiagnosticStatus.ERROR, "unresponsive"
     elif num_answering > 1:
         level, message = DiagnosticStatus.WARN, f"{num_answering} nodes answer for it"
     elif has_trouble:
