@@ -52,12 +52,14 @@ def test_the_messages_declare_the_packages_whose_messages_they_use() -> None:
     assert {each.text for each in root.findall("depend")} == used
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_package_says_who_made_it_and_how_it_is_tested(package: str) -> None:
-    root = ElementTree.parse(SRC / package / "package.xml").getroot()
-    for tag in ("description", "maintainer", "author", "url", "license", "test_depend"):
+@pytest.mark.parametrize("folder", ["msgs", *(f"src/{package}" for package in PACKAGES)])
+def test_a_package_says_who_made_it_and_how_it_is_tested(folder: str) -> None:
+    package = SRC.parent / folder
+    root = ElementTree.parse(package / "package.xml").getroot()
+    tests = [] if folder == "msgs" else ["test_depend"]
+    for tag in ("description", "maintainer", "author", "url", "license", *tests):
         assert root.findtext(tag), tag
     licence = root.find("license")
     assert licence is not None
-    text = (SRC / package / str(licence.get("file"))).read_text()
+    text = (package / str(licence.get("file"))).read_text()
     assert text == (SRC.parent / "LICENSE").read_text()
