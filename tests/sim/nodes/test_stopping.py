@@ -63,7 +63,14 @@ def test_a_signal_while_it_imports_is_one_line(module: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["sim.nodes.simulator", "agent.nodes.taker", "transfer.nodes.transfer"]
+    "module",
+    [
+        "sim.nodes.recorder",
+        "sim.nodes.replayer",
+        "sim.nodes.simulator",
+        "agent.nodes.taker",
+        "transfer.nodes.transfer",
+    ],
 )
 def test_a_nodes_module_is_a_program(module: str) -> None:
     with node(f"keepaway_{module}", "--help") as process:

@@ -29,6 +29,7 @@ from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.ros.subscribing import listen, offered_qos, take_all, to_profile
 from keepaway_sim.settings import flat, setting
 from keepaway_sim.version import code_version
@@ -225,9 +226,9 @@ def main(args: list[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM.
 
     Returns:
-        0 where nothing is missing; 1 where something is, or nothing came; 2 where nothing can be
-        recorded, or no more.
+        0 where nothing is missing; 1 where something is, nothing came, or nothing can be recorded.
     """
+    check_arguments("recorder", (RecorderSettings,), sys.argv[1:] if args is None else args)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -236,7 +237,7 @@ def main(args: list[str] | None = None) -> int:
         recorder = Recorder()
     except (KeepawayError, InvalidParameterTypeException) as error:
         get_logger("recorder").error(str(error))
-        return 2
+        return 1
     recorder.get_logger().info(f"records to {recorder.bag.path}")
     try:
         while not stop.wait(POLL_PERIOD):
@@ -244,7 +245,7 @@ def main(args: list[str] | None = None) -> int:
         report = recorder.finish()
     except KeepawayError as error:
         recorder.get_logger().error(str(error))
-        return 2
+        return 1
     complete = recorder.gaps.is_complete()
     log = recorder.get_logger().info if complete else recorder.get_logger().warning
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")

@@ -32,6 +32,7 @@ from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.cli.interrupts import SIGNALS, Stopped
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.ros.subscribing import message_class, to_profile
 from keepaway_sim.settings import setting
 from keepaway_sim.wire.messages import SECOND
@@ -261,8 +262,9 @@ def main(args: list[str] | None = None) -> int:
     """Play a bag.
 
     Returns:
-        0, or 2 where it cannot be played; after a signal what shells expect, 143 after SIGTERM.
+        0, or 1 where it cannot be played; after a signal what shells expect, 143 after SIGTERM.
     """
+    check_arguments("replayer", (ReplayerSettings,), sys.argv[1:] if args is None else args)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         replayer = Replayer()
@@ -274,7 +276,7 @@ def main(args: list[str] | None = None) -> int:
         replayer.get_logger().info(f"published {count} messages")
     except (KeepawayError, InvalidParameterTypeException) as error:
         get_logger("replayer").error(str(error))
-        return 2
+        return 1
     except Stopped as stopped:
         return stopped.code
     except KeyboardInterrupt:
