@@ -236,16 +236,6 @@ def test_learners_that_share_a_table_learn_from_each_other_and_keep_their_own_tr
         assert team.values[i, 1] == expected
 
 
-def test_a_reset_learner_knows_nothing():
-    me = learner(lambda_=0.5)
-    start(me, 1.0, GREEDY_LAST)
-    step(me, 4.0, 1.5, GREEDY_LAST)
-    sarsa.reset_learner(me, 0)
-    assert not me.weights.any()
-    assert not me.traces.any()
-    assert me.action[0] == NO_ACTION
-
-
 @pytest.mark.parametrize(
     ("setting", "value"),
     [*itertools.product(["alpha", "gamma", "lambda_", "epsilon"], [-0.1, 1.1, float("nan"), "1"])],

@@ -101,11 +101,6 @@ class Tiling:
         rounding = 1e-9  # 180 degrees are 18 tiles of 10 degrees, whatever the division gives
         return math.ceil(float(spans.max()) - rounding) + 1
 
-    @property
-    def num_active(self) -> int:
-        """Active tiles of one state and action."""
-        return self.num_features * NUM_TILINGS
-
     def weights_shape(self, num_actions: int) -> tuple[int, int, int, int]:
         """(num_actions, num_features, num_tiles, num_tilings)."""
         return num_actions, self.num_features, self.num_tiles, NUM_TILINGS

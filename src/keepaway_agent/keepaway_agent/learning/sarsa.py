@@ -356,13 +356,6 @@ def clear_traces(learners, i):
     learners.num_traced[i] = 0
 
 
-@compiled
-def reset_learner(learners, i):
-    """Let learner i, and all who share its weights, know nothing again."""
-    learners.weights[learners.table[i]] = 0.0
-    forget(learners, i)
-
-
 class LearnerSnapshot(NamedTuple):
     """What a learner knows and remembers at one moment; see `snapshot`."""
 

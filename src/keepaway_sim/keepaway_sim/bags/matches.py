@@ -83,10 +83,6 @@ class Found:
         """What its topics' names begin with."""
         return self.topic.rpartition("/")[0]
 
-    def owns(self, topic: str) -> bool:
-        """Whether a topic is one of its own that are ordered by moments, or of its episodes."""
-        return _namespace_of(topic) == self.namespace
-
 
 class _Description(NamedTuple):
     """A Match message and where it came first."""

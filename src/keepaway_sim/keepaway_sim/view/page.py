@@ -11,7 +11,7 @@ import functools
 import html
 import json
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from keepaway_sim.bags.checked import check_match
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag, Track
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.task import Action, Task
+from keepaway_sim.task import Task
 from keepaway_sim.world.config import NEVER
 
 NO_VALUE = -32768
@@ -252,8 +252,3 @@ def _policies(agents: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 @functools.cache
 def _part(name: str) -> str:
     return (resources.files("keepaway_sim.view") / "web" / name).read_text(encoding="utf-8")
-
-
-def pass_moments(track: Track) -> Iterable[int]:
-    """The rows in which a keeper freshly decided to pass, to find a picture worth taking."""
-    return np.flatnonzero((track.requested == Action.PASS_BALL).any(axis=1)).tolist()
