@@ -24,6 +24,8 @@ import urllib.request
 from pathlib import Path
 from typing import NamedTuple
 
+from keepaway_sim.cli.interrupts import restore_ctrl_c
+
 SCRIPTS = Path(__file__).resolve().parents[1]
 PERIOD = 5.0  # [s] between samples
 WARM_UP = 0.25  # of the time, before growth is looked for
@@ -44,6 +46,7 @@ class Sample(NamedTuple):
 def main() -> int:
     """Play, watch, tell."""
     args = parse()
+    restore_ctrl_c()
     os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     with tempfile.TemporaryDirectory(prefix="endurance-") as name:
         folder = Path(name)
@@ -52,6 +55,9 @@ def main() -> int:
             samples, files = watch(started, 60.0 * args.minutes, folder)
         finally:
             ended = end(started)
+        if killed := [name for name, code in ended.items() if code == -signal.SIGKILL]:
+            print(f"endurance: killed, as they did not end: {', '.join(killed)}", file=sys.stderr)
+            return 1
         summary = json.loads((folder / "match.out").read_text().splitlines()[-1])
         written = sum(file.stat().st_size for file in folder.rglob("*.mcap")) / MEGABYTE
         reports = [file.read_text().strip()[-200:] for file in sorted(folder.glob("recorder*.err"))]
@@ -153,11 +159,15 @@ def shared_files() -> int:
 
 
 def end(started: dict[str, "subprocess.Popen[bytes]"]) -> dict[str, int]:
-    """End the match, then those who listen to it; their exit codes."""
+    """End the match, then those who listen to it; their exit codes, -9 of what had to be killed."""
     codes = {}
     for name in reversed(started):
         started[name].send_signal(signal.SIGINT)
-        codes[name] = started[name].wait(PATIENCE)
+        try:
+            codes[name] = started[name].wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            started[name].kill()  # its nodes end with it
+            codes[name] = started[name].wait()
     return codes
 
 

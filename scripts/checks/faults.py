@@ -38,6 +38,7 @@ from keepaway_agent.learning.weights import load_weights
 from keepaway_msgs.msg import Episode
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
+from keepaway_sim.cli.interrupts import restore_ctrl_c
 from keepaway_sim.ros.publishing import ALL, QUEUE
 
 SCRIPTS = Path(__file__).resolve().parents[1]
@@ -205,6 +206,7 @@ class Intruders:
 def main() -> int:
     """Play, inject faults, check, report."""
     args = parse()
+    restore_ctrl_c()
     os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init()
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:

@@ -45,6 +45,8 @@ from other_machines import (
     with_table,
 )
 
+from keepaway_sim.cli.interrupts import restore_ctrl_c
+
 ODD_NAME = "it's ü (x) $HOME & \\ \" 🙂 ` end"
 MAX_MEMORY = 500e6  # [bytes] that refusing a file may take
 
@@ -52,6 +54,7 @@ MAX_MEMORY = 500e6  # [bytes] that refusing a file may take
 def main() -> int:
     """Do the rows, or write the table."""
     args = parse()
+    restore_ctrl_c()
     page = with_table(PAGE.read_text(encoding="utf-8"))
     if args.write:
         PAGE.write_text(page, encoding="utf-8")

@@ -19,6 +19,11 @@ GRACE: Final = 2.0
 """Seconds after a signal in which others are ignored: the program is ending."""
 
 
+def restore_ctrl_c() -> None:
+    """Let SIGINT end what this program starts: a shell lets its background jobs ignore it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 class Stopped(KeyboardInterrupt):
     """A signal asked the program to end.
 
