@@ -40,7 +40,7 @@ def kept() -> dict[str, Any]:
 def keep(figures: Mapping[str, Any]) -> None:
     """Put figures in the place of earlier ones of the same part, and write the page."""
     together = dict(sorted((kept() | dict(figures)).items()))
-    KEPT.write_text(json.dumps(together, indent=1) + "\n")
+    KEPT.write_text(json.dumps(together, indent=1, allow_nan=False) + "\n")
     PAGE.write_text(written(PAGE.read_text(), together))
 
 

@@ -124,10 +124,10 @@ def _knows_players(node: Node) -> bool:
 
 
 def _topics(node: Node, direction: str) -> dict[str, str]:
-    """Topics that a node says or hears, and their types as package/Name."""
+    """Topics that a node publishes or subscribes to, and their types as package/Name."""
     ask = {
-        "says": node.get_publisher_names_and_types_by_node,
-        "hears": node.get_subscriber_names_and_types_by_node,
+        "publishes": node.get_publisher_names_and_types_by_node,
+        "subscribes to": node.get_subscriber_names_and_types_by_node,
     }[direction]
     return _own(ask(node.get_name(), node.get_namespace()))
 
@@ -165,7 +165,7 @@ def test_parameters_and_their_defaults(start: Callable[[str], Node], name: str) 
 def test_topics_and_their_types(start: Callable[[str], Node], name: str) -> None:
     node, documented = start(name), rows(NODES[name], "topic")
     names = [NODES[name].player] if NODES[name].player else Task().player_names
-    for direction in ("says", "hears"):
+    for direction in ("publishes", "subscribes to"):
         assert _topics(node, direction) == {
             "/" + topic.replace("NAME", player).lstrip("/"): message_type
             if "/" in message_type
@@ -178,7 +178,7 @@ def test_topics_and_their_types(start: Callable[[str], Node], name: str) -> None
 
 def test_the_replayers_topics_are_those_of_the_bag(start: Callable[[str], Node]) -> None:
     node = start("replayer")
-    assert _topics(node, "says").keys() == BagReader("recorded").topics.keys()
+    assert _topics(node, "publishes").keys() == BagReader("recorded").topics.keys()
 
 
 @pytest.mark.parametrize("name", NODES)

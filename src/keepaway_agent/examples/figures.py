@@ -19,7 +19,7 @@ def made_here() -> dict[str, str]:
 
 def keep(folder: Path, name: str, **data: Any) -> None:
     """Write `figures.json`; arrays become lists with three decimals."""
-    text = json.dumps({name: made_here() | _plain(data)}, indent=1)
+    text = json.dumps({name: made_here() | _plain(data)}, indent=1, allow_nan=False)
     (folder / "figures.json").write_text(text + "\n")
 
 

@@ -35,9 +35,10 @@ def test_what_a_killed_process_had_is_played_again_and_gives_the_same(caplog, tm
     killed: list[int] = []
 
     def kill_one(_: Progress) -> None:
-        if not killed:
+        # the first may have had nothing to play when it was killed
+        if len(killed) < 2 and "; trials " not in caplog.text:
             killed.append(workers_of(os.getpid())[0].pid)
-            os.kill(killed[0], signal.SIGKILL)
+            os.kill(killed[-1], signal.SIGKILL)
 
     recorder = TRAINING.recorder(tmp_path / "bag")
     spread = {}

@@ -58,9 +58,10 @@ def test_tables_of_other_ways_have_the_sources_of_table2(name):
 
 
 def test_the_readme_names_every_study_with_its_rows_and_trials():
-    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8").split("## Studies")[1]
+    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
+    section = readme.split("## Studies")[1].split("\n## ")[0]
     found: dict[str, str] = {}
-    for names, sizes in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([^|]*) \|", readme, re.MULTILINE):
+    for names, sizes in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([^|]*) \|", section, re.MULTILINE):
         listed = re.findall(r"`(\w+)`", names)
         each = re.findall(r"\d+ x \d+", sizes)
         found |= dict(zip(listed, each * (len(listed) if len(each) == 1 else 1), strict=True))

@@ -161,7 +161,9 @@ class Job(NamedTuple):
     def begin(self) -> subprocess.Popen[bytes]:
         """Begin to compile it in a child process, which keeps it on disk."""
         code = (
-            "import pickle, sys; sys.path = pickle.load(sys.stdin.buffer)\n"
+            "import pickle, sys\n"
+            "try:\n    sys.path = pickle.load(sys.stdin.buffer)\n"
+            "except EOFError:\n    sys.exit()  # the parent has ended\n"
             f"from {__name__} import _child; _child()"
         )
         child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
