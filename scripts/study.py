@@ -10,7 +10,6 @@ scripts/analyze.py makes the report.
 """
 
 import argparse
-import dataclasses
 import logging
 import os
 import shlex
@@ -20,6 +19,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
+import attrs
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
@@ -45,7 +45,7 @@ def main() -> int:
     try:
         study = load_study(arguments.study)
         if arguments.trials:
-            study = dataclasses.replace(study, trials=arguments.trials)
+            study = attrs.evolve(study, trials=arguments.trials)
         with Interruption() as interruption:
             return _run(study, arguments, interruption)
     except Stopped as stopped:

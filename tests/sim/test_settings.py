@@ -13,6 +13,7 @@ from keepaway_sim.settings import (
     changed,
     flat,
     group,
+    required,
     same,
     setting,
     settings_of,
@@ -38,6 +39,13 @@ class Outer:
     inner: Inner = group(Inner)
     loud: bool = setting(False, "or not")
     again: float = same(Inner, "alpha")
+
+
+@attrs.frozen
+class FromFile:
+    """For the tests."""
+
+    seed: int = required(int, "of all trials", "", "[0, 9]")
 
 
 @pytest.mark.parametrize(
@@ -111,6 +119,15 @@ def test_a_table_has_a_row_for_each_setting():
         "| `loud` | false |  |  | or not |",
         "| `again` | 0.5 | 1 | 0 to 1 | step size |",
     ]
+
+
+def test_a_required_setting_is_checked_and_has_no_default():
+    assert FromFile(3).seed == 3
+    with pytest.raises(SettingError, match=r"^seed=10: give a whole number from 0 to 9$"):
+        FromFile(10)
+    with pytest.raises(TypeError, match="seed"):
+        FromFile()
+    assert table(FromFile).splitlines()[2:] == ["| `seed` | required |  | 0 to 9 | of all trials |"]
 
 
 def test_every_constant_of_the_world_has_a_sentence_and_a_range():

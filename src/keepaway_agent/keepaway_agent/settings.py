@@ -83,7 +83,8 @@ class Setting:
 
     Attributes:
         name: in the class, in files and as a ROS parameter.
-        default: that it has; its type is the setting's.
+        kind: bool, int, float or str.
+        default: that it has; `attrs.NOTHING` if it must be given.
         text: what it is, without a full stop.
         unit: "m", "1" for a ratio or a share, "" where it has none.
         range: of a number.
@@ -92,6 +93,7 @@ class Setting:
     """
 
     name: str
+    kind: type
     default: Any
     text: str
     unit: str
@@ -100,17 +102,12 @@ class Setting:
     was: tuple[str, ...]
 
     @property
-    def kind(self) -> type:
-        """bool, int, float or str."""
-        return type(self.default)
-
-    @property
     def wanted(self) -> str:
         """What may be given, in words."""
         if self.kind is bool:
             return "true or false"
         if self.kind is str:
-            return " or ".join(self.choices) if self.choices else "a text"
+            return " or ".join(each or '""' for each in self.choices) or "a text"
         words = "a whole number" if self.kind is int else "a number"
         unit = f"[{self.unit}]" if self.unit else ""
         return " ".join(filter(None, (words, str(self.range), unit)))
@@ -158,7 +155,20 @@ def setting(
     A value is converted where nothing is lost by it (1 to 1.0), then checked.
     """
     limits = Range.parse(range) if range else EVERY_NUMBER
-    return _field(Setting("", default, text, unit, limits, tuple(choices), tuple(was)))
+    return _field(
+        Setting("", type(default), default, text, unit, limits, tuple(choices), tuple(was))
+    )
+
+
+def required(
+    kind: type,
+    text: str,
+    unit: str = "",
+    range: str = "",  # noqa: A002 - as `setting`
+) -> Any:
+    """A field of a settings class that has no default, for settings that come from a file."""
+    limits = Range.parse(range) if range else EVERY_NUMBER
+    return _field(Setting("", kind, attrs.NOTHING, text, unit, limits, (), ()))
 
 
 def group(settings: type) -> Any:
@@ -216,7 +226,8 @@ def table(settings: type, heading: str = "setting") -> str:
     """The settings of a class as a table in Markdown."""
     rows = [f"| {heading} | default | unit | range | what it is |", "|---|---|---|---|---|"]
     for declared in settings_of(settings).values():
-        cells = (f"`{declared.name}`", as_text(declared.default), declared.unit, limits(declared))
+        default = "required" if declared.default is attrs.NOTHING else as_text(declared.default)
+        cells = (f"`{declared.name}`", default, declared.unit, limits(declared))
         rows.append(f"| {' | '.join((*cells, declared.text))} |")
     return "\n".join(rows) + "\n"
 

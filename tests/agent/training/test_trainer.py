@@ -1,6 +1,7 @@
 """The trainer: a trial depends on itself alone, and plays as the players of the nodes do."""
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -232,11 +233,33 @@ def test_no_trials_give_no_results():
     assert play([], 2) == []
 
 
+@pytest.mark.parametrize(
+    ("rule", "refusal"),
+    [
+        ({"max_episodes": -1}, "max_episodes=-1: give a whole number from 0"),
+        ({"max_episodes": 1.5}, "max_episodes=1.5: give a whole number from 0"),
+        ({"max_cycles": -1}, "max_cycles=-1: give a whole number from 0"),
+        ({"max_cycles": 10**13}, "max_cycles=10000000000000: give a whole number from 0"),
+        ({"threshold": -1}, "threshold=-1.0: give a number from 0"),
+        ({"threshold": math.nan}, "threshold=nan: give a number from 0"),
+        ({"window": 0}, "window=0: give a whole number from 1"),
+        ({"min_cycles": -1}, "min_cycles=-1: give a whole number from 0"),
+        ({"min_cycles": "1"}, "min_cycles='1': give a whole number from 0"),
+    ],
+)
+def test_a_stop_rule_outside_its_range_is_refused_by_name(rule, refusal):
+    with pytest.raises(AgentError, match=refusal):
+        StopRule(**{"max_episodes": 1, **rule})
+
+
+def test_a_trainer_between_whose_choices_are_no_cycles_is_refused():
+    with pytest.raises(AgentError, match="decision_interval=0: give a whole number from 1"):
+        TrainerConfig(decision_interval=0)
+
+
 def test_rules_that_never_stop_a_trial_are_refused():
     with pytest.raises(AgentError, match="max_episodes or max_cycles"):
         StopRule(threshold=9.0)
-    with pytest.raises(AgentError, match="window=0"):
-        StopRule(max_episodes=1, window=0)
     with pytest.raises(AgentError, match="keeper policy 'best'"):
         play([make_trial(0, keeper_policy="best")], 1)
     with pytest.raises(AgentError, match="ordering='x'"):

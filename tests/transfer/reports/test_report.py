@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import attrs
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -65,7 +66,7 @@ def test_each_trial_is_measured_from_its_own_episodes(worked):
 
 
 def test_what_trials_hold_at_their_end_is_told_only_where_they_do_not_stop_at_the_threshold():
-    stopping, going_on = STUDY, dataclasses.replace(STUDY, min_hours=10.0)
+    stopping, going_on = STUDY, attrs.evolve(STUDY, min_hours=10.0)
     for study, expected in ((stopping, [np.nan] * 2), (going_on, [1800.0] * 2)):
         trials = [trial("0", 0, 6), trial("0", 1, 8)]
         found = measure_trials(results(*trials, study=study))
@@ -109,8 +110,8 @@ def test_a_row_is_compared_with_the_reference_by_hours_saved(worked):
 
 
 ROWS = (Row("0"), Row("a", (Stage("3v2", 10),)), Row("b", (Stage("3v2", 20),)))
-INDEPENDENT = dataclasses.replace(STUDY, rows=ROWS, references=("0", "a"))
-SHARED = dataclasses.replace(INDEPENDENT, shared_sources=True)
+INDEPENDENT = attrs.evolve(STUDY, rows=ROWS, references=("0", "a"))
+SHARED = attrs.evolve(INDEPENDENT, shared_sources=True)
 
 
 def test_rows_that_share_their_sources_are_tested_as_pairs():

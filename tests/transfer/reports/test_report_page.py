@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import attrs
 import numpy as np
 import pytest
 
@@ -130,7 +131,7 @@ def test_rows_of_two_studies_are_pairs_where_they_share_their_source_runs(studie
     # Every trial is four hours faster: as pairs that is certain.
     assert difference((table2, "1000"), (at_5, "1000"), "target_hours") == (4.0, 4.0, 4.0, 0.0)
     other = Evidence(
-        dataclasses.replace(at_5.results, study=dataclasses.replace(at_5.results.study, seed=1))
+        dataclasses.replace(at_5.results, study=attrs.evolve(at_5.results.study, seed=1))
     )
     assert difference((table2, "1000"), (other, "1000"), "target_hours").low < 4.0
 

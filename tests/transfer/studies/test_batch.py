@@ -1,7 +1,6 @@
 """Trials as they are played: their stages, what goes from one to the next, and who shares what."""
 
-import dataclasses
-
+import attrs
 import numpy as np
 import pytest
 
@@ -74,7 +73,7 @@ def test_the_greedy_episodes_come_after(trials):
 
 
 def test_a_studys_seed_decides_its_trials(trials):
-    other = dataclasses.replace(TINY, seed=TINY.seed + 1)
+    other = attrs.evolve(TINY, seed=TINY.seed + 1)
     assert play_batch(other, KEYS[:1])[0].cycles != trials["0", 0].cycles
 
 
@@ -90,14 +89,14 @@ def test_all_target_keepers_start_with_one_source_keepers_weights_through_rho(ru
 
 def test_a_chain_goes_through_every_task(runs):
     chain = Row("chain", (Stage("2v1", 3), Stage("3v1", 2)))
-    study = dataclasses.replace(TINY, rows=(*TINY.rows, chain))
+    study = attrs.evolve(TINY, rows=(*TINY.rows, chain))
     (trial,) = play_batch(study, [("chain", 0)])
     assert [(source.task, source.episodes) for source in trial.sources] == [("2v1", 3), ("3v1", 2)]
     assert [task for task, _ in runs] == ["2v1", "3v1", "3v2", "3v2"]
 
 
 def test_rows_that_share_their_sources_take_them_from_one_run_as_it_goes(runs):
-    study = dataclasses.replace(TINY, shared_sources=True)
+    study = attrs.evolve(TINY, shared_sources=True)
     keys = [(row.name, 0) for row in study.rows]
     _, four, eight = play_batch(study, keys)
     (source,) = [result for task, result in runs if task == "2v1"]
@@ -109,7 +108,7 @@ def test_rows_that_share_their_sources_take_them_from_one_run_as_it_goes(runs):
 
 
 def test_keepers_that_share_a_value_function_end_with_equal_weights(runs):
-    play_batch(dataclasses.replace(TINY, shared_keepers=True), [("0", 0)])
+    play_batch(attrs.evolve(TINY, shared_keepers=True), [("0", 0)])
     first, second, third = runs[0][1].keeper_weights
     np.testing.assert_array_equal(first, second)
     np.testing.assert_array_equal(first, third)
@@ -118,7 +117,7 @@ def test_keepers_that_share_a_value_function_end_with_equal_weights(runs):
 
 def test_shuffled_trials_have_shuffles_of_their_own(runs):
     rows = (Row("0"), Row("shuffled", (Stage("2v1", 4),), "shuffled"))
-    study = dataclasses.replace(TINY, rows=rows, shared_sources=True)
+    study = attrs.evolve(TINY, rows=rows, shared_sources=True)
     play_batch(study, [("shuffled", 0), ("shuffled", 1)])
     first, second = [result.trial for task, result in runs if task == "3v2"][:2]
     assert np.any(first.keeper_weights != second.keeper_weights)
@@ -126,7 +125,7 @@ def test_shuffled_trials_have_shuffles_of_their_own(runs):
 
 def test_an_optimistic_row_starts_at_a_constant_of_its_level(runs):
     rows = (Row("0"), Row("high", variant="optimistic@5"))
-    (trial,) = play_batch(dataclasses.replace(TINY, rows=rows), [("high", 0)])
+    (trial,) = play_batch(attrs.evolve(TINY, rows=rows), [("high", 0)])
     assert trial.start_level == pytest.approx(5.0)
     (weight,) = np.unique(runs[0][1].trial.keeper_weights)
     assert weight * 13 * 32 / 10 == pytest.approx(5.0)  # all active tiles, in seconds
@@ -134,7 +133,7 @@ def test_an_optimistic_row_starts_at_a_constant_of_its_level(runs):
 
 def test_a_row_plays_with_its_own_tile_widths(runs):
     rows = (Row("0"), Row("wide", (Stage("2v1", 4),), widths="framework"))
-    play_batch(dataclasses.replace(TINY, target="4v3", rows=rows), [("0", 0), ("wide", 0)])
+    play_batch(attrs.evolve(TINY, target="4v3", rows=rows), [("0", 0), ("wide", 0)])
     shapes = [result.keeper_weights.shape[1:] for task, result in runs if task == "4v3"]
     expected = [
         make_tiling(Role.KEEPER, 4, 3, profile=profile).weights_shape(4)
@@ -145,7 +144,7 @@ def test_a_row_plays_with_its_own_tile_widths(runs):
 
 def test_rows_that_start_alike_give_equal_trials_in_any_study_whatever_they_are_called():
     rows = (Row("scratch"), Row("four", (Stage("2v1", 4),)))
-    other = dataclasses.replace(TINY, name="other", rows=rows, references=("scratch",))
+    other = attrs.evolve(TINY, name="other", rows=rows, references=("scratch",))
     for mine, theirs in (("0", "scratch"), ("4", "four")):
         (first,), (second,) = play_batch(TINY, [(mine, 1)]), play_batch(other, [(theirs, 1)])
         assert (first.cycles, first.greedy_cycles) == (second.cycles, second.greedy_cycles)
@@ -153,14 +152,14 @@ def test_rows_that_start_alike_give_equal_trials_in_any_study_whatever_they_are_
 
 def test_rows_of_one_start_take_their_source_from_one_run_and_go_on_with_seeds_of_their_own(runs):
     rows = (Row("0"), Row("a", (Stage("2v1", 4),)), Row("b", (Stage("2v1", 4),), "rescaled"))
-    play_batch(dataclasses.replace(TINY, rows=rows), [("a", 0), ("b", 0)])
+    play_batch(attrs.evolve(TINY, rows=rows), [("a", 0), ("b", 0)])
     assert [task for task, _ in runs].count("2v1") == 1
     first, second = [result.trial.seed.spawn_key for task, result in runs if task == "3v2"][:2]
     assert first != second
 
 
 def test_trials_of_one_number_have_one_seed_where_the_study_says_so(runs):
-    play_batch(dataclasses.replace(TINY, shared_seeds=True), [("0", 0), ("4", 0), ("0", 1)])
+    play_batch(attrs.evolve(TINY, shared_seeds=True), [("0", 0), ("4", 0), ("0", 1)])
     seeds = {
         result.trial.label.row.name + str(result.trial.label.number): result.trial.seed.spawn_key
         for task, result in runs

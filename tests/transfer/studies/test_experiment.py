@@ -1,10 +1,10 @@
 """A study is run to its end on any executor, whatever interrupts it."""
 
-import dataclasses
 import gc
 import weakref
 from concurrent.futures import ThreadPoolExecutor, wait
 
+import attrs
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -46,14 +46,14 @@ def run_all(folder, play, resume=False, study=TINY, batch=3):
 @pytest.mark.parametrize("shared", [False, True])
 @given(done=st.sets(st.sampled_from(KEYS)), batch=st.integers(1, 20))
 def test_every_trial_that_is_left_is_planned_once(shared, done, batch):
-    study = dataclasses.replace(TINY, shared_sources=shared)
+    study = attrs.evolve(TINY, shared_sources=shared)
     planned = [key for keys in plan(study, done, batch) for key in keys]
     assert len(planned) == len(set(planned))
     assert set(planned) == set(KEYS) - done
 
 
 def test_rows_that_share_their_sources_are_played_together():
-    study = dataclasses.replace(TINY, shared_sources=True)
+    study = attrs.evolve(TINY, shared_sources=True)
     assert plan(study, set(), batch=3)[0] == (("0", 0), ("4", 0), ("8", 0))
 
 
@@ -82,7 +82,7 @@ def test_a_run_keeps_no_trial_that_is_on_the_disk(tmp_path):
         kept.extend(weakref.ref(trial) for trial in trials)
         return trials
 
-    many = dataclasses.replace(TINY, trials=100)
+    many = attrs.evolve(TINY, trials=100)
     with (
         ThreadPoolExecutor(1) as executor,
         open_results(tmp_path, many, command="x", code_version="v1") as results,
@@ -98,7 +98,7 @@ def test_a_run_keeps_no_trial_that_is_on_the_disk(tmp_path):
 
 def test_more_trials_are_added_to_a_study_that_is_done(tmp_path):
     run_all(tmp_path, play)
-    more = dataclasses.replace(TINY, trials=TINY.trials + 1)
+    more = attrs.evolve(TINY, trials=TINY.trials + 1)
     added = run_all(tmp_path, play, resume=True, study=more)
     assert sorted(trial.key for trial in added) == [(row.name, TINY.trials) for row in TINY.rows]
 

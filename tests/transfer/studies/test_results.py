@@ -1,9 +1,9 @@
 """Results land trial by trial, survive a kill, and are never mixed or overwritten."""
 
-import dataclasses
 import fcntl
 import multiprocessing
 
+import attrs
 import pytest
 
 from keepaway_transfer.errors import StudyError
@@ -78,7 +78,7 @@ def test_results_are_not_touched_without_resume(tmp_path):
 
 def test_a_changed_setting_is_refused_by_name(tmp_path):
     append(tmp_path, 0)
-    changed = dataclasses.replace(STUDY, threshold=6.0)
+    changed = attrs.evolve(STUDY, threshold=6.0)
     with pytest.raises(StudyError, match=r"Changed: threshold: 5\.0 -> 6\.0"):
         append(tmp_path, 1, study=changed, resume=True)
 
@@ -93,7 +93,7 @@ def test_other_code_is_refused_unless_it_is_said_not_to_matter(tmp_path):
 
 def test_more_trials_are_no_changed_setting(tmp_path):
     append(tmp_path, 0)
-    append(tmp_path, 1, study=dataclasses.replace(STUDY, trials=9), resume=True)
+    append(tmp_path, 1, study=attrs.evolve(STUDY, trials=9), resume=True)
     assert len(read_results(tmp_path).records) == 2
 
 
@@ -152,7 +152,7 @@ def test_packing_again_gives_the_same_bytes(tmp_path):
 
 
 def test_a_record_keeps_blocks_and_the_first_and_last_episodes(tmp_path):
-    study = dataclasses.replace(STUDY, window=1000, threshold=9.0)
+    study = attrs.evolve(STUDY, window=1000, threshold=9.0)
     cycles = tuple(range(10, 2000))
     record = record_of(StudyTrial("0", 0, (), cycles, (50, 70), "v1"), study)
     assert (record.block, len(record.blocks)) == (
@@ -181,7 +181,7 @@ def test_a_file_that_is_no_packed_trials_is_refused_with_its_path(tmp_path):
 def _begin(folder, threshold, barrier, answers):
     barrier.wait()
     try:
-        with opened(folder, study=dataclasses.replace(STUDY, threshold=threshold)) as results:
+        with opened(folder, study=attrs.evolve(STUDY, threshold=threshold)) as results:
             answers.put(threshold)
             results.append(trial(0))
             barrier.wait()  # until the other one was refused

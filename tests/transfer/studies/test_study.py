@@ -1,5 +1,6 @@
 """Studies are data, and data that make no study are refused by name."""
 
+import math
 import re
 
 import pytest
@@ -59,7 +60,7 @@ def test_tables_of_other_ways_have_the_sources_of_table2(name):
 
 def test_the_readme_names_every_study_with_its_rows_and_trials():
     readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
-    section = readme.split("## Studies")[1].split("\n## ")[0]
+    section = readme.split("## Studies")[1].split("\nA study of")[0]
     found: dict[str, str] = {}
     for names, sizes in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([^|]*) \|", section, re.MULTILINE):
         listed = re.findall(r"`(\w+)`", names)
@@ -141,8 +142,26 @@ def test_constants_of_world_and_learner_are_changed_by_name():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"threshold": 0}, "threshold=0"),
-        ({"min_hours": 50, "max_hours": 40}, "min_hours=50"),
+        ({"name": 7}, "name=7: give a text"),
+        ({"target": 4}, "target=4: give a text"),
+        ({"threshold": 0}, "threshold=0.0: give a number above 0 and up to 1000000 [s]"),
+        ({"threshold": math.nan}, "threshold=nan: give a number above 0"),
+        ({"threshold": "9"}, "threshold='9': give a number above 0"),
+        ({"seed": -1}, "seed=-1: give a whole number from 0"),
+        ({"seed": 1.5}, "seed=1.5: give a whole number from 0"),
+        ({"trials": 0}, "trials=0: give a whole number from 1"),
+        ({"window": 0}, "window=0: give a whole number from 1"),
+        ({"min_hours": -1}, "min_hours=-1.0: give a number from 0"),
+        ({"max_hours": 0}, "max_hours=0.0: give a number from 0.0001"),
+        ({"min_hours": 50, "max_hours": 40}, "min_hours=50.0: give 0 to max_hours=40.0"),
+        ({"greedy_episodes": -1}, "greedy_episodes=-1: give a whole number from 0"),
+        ({"shared_sources": 2}, "shared_sources=2: give true or false"),
+        ({"shared_seeds": "yes"}, "shared_seeds='yes': give true or false"),
+        ({"shared_keepers": "yes"}, "shared_keepers='yes': give true or false"),
+        ({"field": "25"}, "25"),
+        ({"profile": "2006"}, "profile='2006': give 2005 or v19"),
+        ({"ordering": "far"}, "ordering='far': give ball or k1"),
+        ({"widths": "broad"}, "widths='broad': give default"),
         ({"references": ["none"]}, "reference 'none' is not one of the rows scratch, 1000"),
         ({"references": []}, "references=[]"),
         ({"rows": [{"name": "scratch"}] * 2}, "two rows of one name"),
@@ -150,10 +169,15 @@ def test_constants_of_world_and_learner_are_changed_by_name():
         ({"rows": [{"name": "scratch", "variant": "optimistic"}]},
          "row scratch: variant='optimistic' carries what was learned before"),
         ({"rows": [{"name": "scratch", "variant": "rho@5"}]}, "variant='rho@5' carries"),
-        ({"rows": [{"name": "scratch", "widths": "broad"}]}, "row scratch: widths='broad'"),
+        ({"rows": [{"name": "scratch", "widths": "broad"}]},
+         "row scratch: widths='broad': give \"\" or default"),
+        ({"rows": [{"name": 0}]}, "row 0: name=0: give a text"),
         ({"rows": [{"name": "scratch", "stages": [{"task": "5v4", "episodes": 1}]}]},
          "5v4 is no source for 4v3"),
-        ({"rows": [{"name": "scratch", "stages": [{"task": "3v2", "episodes": 0}]}]}, "episodes=0"),
+        ({"rows": [{"name": "scratch", "stages": [{"task": "3v2", "episodes": 0}]}]},
+         "row scratch: episodes=0: give a whole number from 1"),
+        ({"rows": [{"name": "scratch", "stages": [{"task": 3, "episodes": 1}]}]},
+         "row scratch: task=3: give a text"),
         ({"treshold": 9}, "treshold"),
         ({"world": {"kick_random": 1}}, "kick_random"),
         ({"learner": {"alfa": 1}}, "alfa"),
@@ -161,7 +185,7 @@ def test_constants_of_world_and_learner_are_changed_by_name():
     ],
 )  # fmt: skip
 def test_what_makes_no_study_is_refused_by_name(change, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
+    with pytest.raises(StudyError, match=re.escape(message)):
         study_from({**PLAIN, **change})
 
 

@@ -92,7 +92,7 @@ class Training:
     def stop(self) -> StopRule:
         """When a trial ends."""
         cycles = round(self.hours / HOURS_PER_CYCLE)
-        return StopRule(max_episodes=self.episodes, max_cycles=cycles or None)
+        return StopRule(max_episodes=self.episodes, max_cycles=cycles)
 
     def start(self) -> list[LearnedWeights]:
         """The weights that the keepers start from; none if they know nothing.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import attrs
 import numpy as np
 
 from keepaway_agent.actions import Role
@@ -13,21 +14,26 @@ from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.cmac import Tiling, make_tiling
 from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import HOURS_PER_CYCLE
-from keepaway_agent.playing import policies
+from keepaway_agent.playing.agent import AgentConfig
+from keepaway_agent.settings import group, same, setting
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import CYCLE_TIME, Config
 from keepaway_sim.world.world import World
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class TrainerConfig:
-    """What is the same for all trials of a trainer."""
+    """What is the same for all trials of a trainer.
 
-    task: Task = field(default_factory=Task)
-    world: Config = field(default_factory=Config)
-    learner: LearnerConfig = field(default_factory=LearnerConfig)
-    decision_interval: int = policies.TAKER_DECISION_INTERVAL  # [cycles] between takers' choices
-    shared: bool = False  # all keepers of a trial learn one value function
+    Raises:
+        AgentError: a value outside its range.
+    """
+
+    task: Task = attrs.field(factory=Task)
+    world: Config = group(Config)
+    learner: LearnerConfig = group(LearnerConfig)
+    decision_interval: int = same(AgentConfig, "decision_interval")
+    shared: bool = setting(False, "all keepers of a trial learn one value function")
 
     def tiling(self, role: Role) -> Tiling:
         """The tiling of a role's state variables."""
@@ -42,27 +48,29 @@ class TrainerConfig:
         )
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class StopRule:
-    """When a trial ends: at the first of these.
+    """When a trial ends: at the first of these. 0 sets no limit.
 
     Raises:
-        AgentError: a rule that never stops, or that makes no sense.
+        AgentError: a value outside its range, or a rule that never stops.
     """
 
-    max_episodes: int | None = None
-    max_cycles: int | None = None  # an episode that runs then is dropped
-    threshold: float | None = None  # [s] the mean duration over a window is more than this
-    window: int = 1000  # [episodes]
-    min_cycles: int = 0  # the threshold stops no trial before
+    max_episodes: int = setting(0, "then it ends", "episodes", "[0, 1000000000]")
+    max_cycles: int = setting(
+        0, "then it ends; an unfinished episode is dropped", "cycles", "[0, 1000000000000]"
+    )
+    threshold: float = setting(
+        0.0, "the mean duration over a window is more than this", "s", "[0, 1000000]"
+    )
+    window: int = setting(1000, "that the mean is over", "episodes", "[1, 1000000000]")
+    min_cycles: int = setting(
+        0, "the threshold ends no trial before", "cycles", "[0, 1000000000000]"
+    )
 
-    def __post_init__(self) -> None:
-        if self.max_episodes is None and self.max_cycles is None:
+    def __attrs_post_init__(self) -> None:
+        if not self.max_episodes and not self.max_cycles:
             raise AgentError("a trial needs max_episodes or max_cycles: it may never end otherwise")
-        for name in ("max_episodes", "max_cycles", "threshold", "window"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise AgentError(f"{name}={value}: give a positive number")
 
 
 class Moment(NamedTuple):
@@ -151,13 +159,13 @@ class RunningTrial:
         self._cycles_in_window += cycles
         if len(self.durations) > stop.window:
             self._cycles_in_window -= self.durations[-stop.window - 1]
-        if stop.threshold is not None and len(self.durations) >= stop.window:
+        if stop.threshold and len(self.durations) >= stop.window:
             mean = self._cycles_in_window * CYCLE_TIME / stop.window
             self.reached = self.reached or mean > stop.threshold
 
     def is_over(self) -> bool:
         """Whether the stop rule says so; its `max_cycles` is the trainer's business."""
         stop = self.trial.stop
-        if stop.max_episodes is not None and len(self.durations) >= stop.max_episodes:
+        if stop.max_episodes and len(self.durations) >= stop.max_episodes:
             return True
         return self.reached and self._cycles >= stop.min_cycles

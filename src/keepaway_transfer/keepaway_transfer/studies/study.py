@@ -8,17 +8,20 @@ no stages is training from scratch.
 Row(name='1000', stages=(Stage(task='3v2', episodes=1000),), variant='rho', widths='')
 """
 
-import dataclasses
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import attrs
+
+from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.cmac import WIDTH_PROFILES
 from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.settings import build
+from keepaway_sim.errors import KeepawayError
+from keepaway_sim.settings import required, same, setting
 from keepaway_sim.task import Task
 from keepaway_sim.world import config as world_config
 from keepaway_sim.world.config import Config
@@ -28,22 +31,22 @@ from keepaway_transfer.variants import variant_of
 FOLDER = Path(__file__).parent
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class Stage:
     """Training before the target task: N episodes of a smaller one."""
 
-    task: str  # "3v2"
-    episodes: int
+    task: str = required(str, "keepers v takers")
+    episodes: int = required(int, "learned from", "episodes", "[1, 1000000000]")
 
 
-@dataclass(frozen=True)
+@attrs.frozen
 class Row:
     """One line of the study's table: trials that start alike."""
 
-    name: str
+    name: str = required(str, "of the row")
     stages: tuple[Stage, ...] = ()  # in order; the weights of one keeper are carried to the next
-    variant: str = "rho"  # as variants.variant_of reads it, between all stages
-    widths: str = ""  # profile of tile widths; empty: the study's
+    variant: str = setting("rho", "what is carried between stages, or a start without a source")
+    widths: str = setting("", "of the tiles; empty: as the study's", choices=("", *WIDTH_PROFILES))
 
     @property
     def is_scratch(self) -> bool:
@@ -69,41 +72,53 @@ class Row:
         return sum(stage.episodes for stage in self.stages)
 
 
-@dataclass(frozen=True)
+@attrs.frozen(kw_only=True)
 class Study:
     """Everything that decides what the trials give; `trials` only decides how many there are.
 
     Raises:
-        StudyError: settings that make no study, by name.
+        KeepawayError, AgentError: settings that make no study, by name.
     """
 
-    name: str
-    target: str  # task that all rows end with, "4v3"
+    name: str = required(str, "of the study")
+    target: str = required(str, "task that all rows end with, keepers v takers")
     rows: tuple[Row, ...]
     references: tuple[str, ...]  # rows that the others are compared with; the first is scratch
-    threshold: float  # [s] mean duration at which the target task counts as learned
-    seed: int
-    trials: int = 100  # a row
-    window: int = 1000  # episodes that the mean duration is over
-    min_hours: float = 0.0  # simulated, of the target task: played also after the threshold
-    max_hours: float = 40.0  # simulated, of the target task: give up, the trial is censored
-    greedy_episodes: int = 0  # played without learning or exploring after the target task
-    shared_sources: bool = False  # is a row's source run part of that of a row of more episodes?
-    shared_seeds: bool = False  # do trials of one number have one seed in the target task?
-    field: str = "25x25"  # length x width [m]
-    profile: str = "2005"  # of the world's constants
-    world: Mapping[str, float] = dataclasses.field(
-        default_factory=dict
-    )  # constants changed by name
-    shared_keepers: bool = False  # do all keepers of a team learn one value function?
-    ordering: str = "ball"  # of the players in the state variables
-    widths: str = "default"  # profile of tile widths
-    learner: Mapping[str, float] = dataclasses.field(
-        default_factory=dict
-    )  # of LearnerConfig, changed by name
+    threshold: float = required(
+        float, "mean duration of episodes at which the target task is learned", "s", "(0, 1000000]"
+    )
+    seed: int = required(int, "of all trials", "", "[0, 9223372036854775807]")
+    trials: int = setting(100, "of every row", "trials", "[1, 1000000000]")
+    window: int = setting(1000, "that the mean is over", "episodes", "[1, 1000000000]")
+    min_hours: float = setting(
+        0.0, "simulated, of the target task: played also after the threshold", "h", "[0, 1000000]"
+    )
+    max_hours: float = setting(
+        40.0, "simulated, of the target task: then the trial is censored", "h", "[0.0001, 1000000]"
+    )
+    greedy_episodes: int = setting(
+        0,
+        "played without learning or exploring after the target task",
+        "episodes",
+        "[0, 1000000000]",
+    )
+    shared_sources: bool = setting(
+        False, "a row's source run is part of that of a row of more episodes"
+    )
+    shared_seeds: bool = setting(False, "trials of one number have one seed in the target task")
+    field: str = setting("25x25", "length x width of the field", "m")
+    profile: str = same(Config, "profile")
+    world: Mapping[str, float] = attrs.field(factory=dict)  # of Config, changed by name
+    shared_keepers: bool = setting(False, "all keepers of a trial learn one value function")
+    ordering: str = same(LearnerConfig, "ordering")
+    widths: str = same(LearnerConfig, "tile_widths")
+    learner: Mapping[str, float] = attrs.field(factory=dict)  # of LearnerConfig, changed by name
 
-    def __post_init__(self) -> None:
-        _check(self)
+    def __attrs_post_init__(self) -> None:
+        _check_rows(self)
+        if self.min_hours > self.max_hours:
+            raise StudyError(f"min_hours={self.min_hours}: give 0 to max_hours={self.max_hours}")
+        _ = self.world_settings, self.learner_config  # refuse unknown names now
 
     def task(self, name: str) -> Task:
         """A task of this study on its field."""
@@ -140,7 +155,7 @@ class Study:
     @property
     def settings(self) -> dict[str, Any]:
         """Plain data that decides what a trial gives; without `trials`, which may grow."""
-        data = dataclasses.asdict(self)
+        data = attrs.asdict(self)
         del data["trials"]
         return data
 
@@ -173,16 +188,21 @@ def study_from(data: Mapping[str, Any]) -> Study:
         return Study(rows=rows, references=tuple(rest.pop("references")), **rest)
     except KeyError as missing:
         raise StudyError(f"{missing} is missing") from missing
+    except (KeepawayError, AgentError) as error:
+        raise StudyError(str(error)) from error
     except (TypeError, AttributeError) as error:
         raise StudyError(f"not the settings of a study: {error}") from error
 
 
 def _row_from(data: Mapping[str, Any]) -> Row:
-    stages = tuple(Stage(**stage) for stage in data.get("stages", ()))
-    return Row(**{**data, "stages": stages})
+    try:
+        stages = tuple(Stage(**stage) for stage in data.get("stages", ()))
+        return Row(**{**data, "stages": stages})
+    except (KeepawayError, AgentError) as error:
+        raise StudyError(f"row {data.get('name')}: {error}") from error
 
 
-def _check(study: Study) -> None:
+def _check_rows(study: Study) -> None:
     names = [row.name for row in study.rows]
     if len(set(names)) != len(names):
         raise StudyError(f"two rows of one name among {', '.join(names)}")
@@ -193,14 +213,6 @@ def _check(study: Study) -> None:
         raise StudyError("references=[]: name the row that learns from scratch")
     for row in study.rows:
         _check_row(row, study)
-    for name in ("threshold", "trials", "window", "max_hours"):
-        if not getattr(study, name) > 0:
-            raise StudyError(f"{name}={getattr(study, name)}: give a positive number")
-    if not 0 <= study.min_hours <= study.max_hours:
-        raise StudyError(f"min_hours={study.min_hours}: give 0 to max_hours={study.max_hours}")
-    if study.greedy_episodes < 0:
-        raise StudyError(f"greedy_episodes={study.greedy_episodes}: give 0 or more")
-    _ = study.world_settings, study.learner_config  # refuse unknown names now
 
 
 def _check_row(row: Row, study: Study) -> None:
@@ -213,14 +225,7 @@ def _check_row(row: Row, study: Study) -> None:
             f"row {row.name}: variant={row.variant!r} carries what was learned before: give the"
             " row stages, or let it start at a constant, like optimistic@5"
         )
-    if row.widths and row.widths not in WIDTH_PROFILES:
-        raise StudyError(
-            f"row {row.name}: widths={row.widths!r}: choose one of {', '.join(WIDTH_PROFILES)}"
-        )
     tasks = [study.task(stage.task) for stage in row.stages] + [study.task(study.target)]
     for smaller, larger in pairwise(tasks):
         if smaller.num_keepers > larger.num_keepers or smaller.num_takers > larger.num_takers:
             raise StudyError(f"row {row.name}: {smaller.name} is no source for {larger.name}")
-    for stage in row.stages:
-        if stage.episodes < 1:
-            raise StudyError(f"row {row.name}: episodes={stage.episodes}: give a positive number")
