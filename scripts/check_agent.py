@@ -80,7 +80,7 @@ def parse() -> argparse.Namespace:
     add("--seed", type=int, default=0, help="of the script's random numbers (default 0)")
     add("--one-size", action="store_true", help="no match of another size, for a learner of 3v2")
     add("--answer-timeout", type=float, default=2.0, help="for an answer [s] (default 2)")
-    add("--end-timeout", type=float, default=5.0, help="for it to end when told to [s] (default 5)")
+    add("--end-timeout", type=float, default=5.0, help="to end after SIGTERM [s] (default 5)")
     add("--domain", type=int, help="ROS domain (default: that of the environment)")
     add("--json", action="store_true", help="end with one JSON object")
     return parser.parse_args()

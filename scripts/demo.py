@@ -245,12 +245,12 @@ def study(args: Args, sources: Sequence[Path]) -> dict[str, list[np.ndarray]]:
 
 def learn_4v3(args: Args, starts: Sequence[np.ndarray | None], label: str) -> list[np.ndarray]:
     """Durations [s] of all episodes of each trial, one trial for each start."""
-    told = time.monotonic()
+    reported = time.monotonic()
 
     def watch(progress: Progress) -> None:
-        nonlocal told
-        if time.monotonic() - told > PROGRESS_EVERY:
-            told = time.monotonic()
+        nonlocal reported
+        if time.monotonic() - reported > PROGRESS_EVERY:
+            reported = time.monotonic()
             hours = progress.cycles / CYCLES_PER_HOUR
             print(f"{label}: {hours:.1f}/{args.target_hours * len(starts):g} hours", flush=True)
 

@@ -38,7 +38,7 @@ def main() -> None:
         build = ["build", "--strict", "--quiet", "-f", str(settings)]
         done = subprocess.run([sys.executable, "-m", "mkdocs", *build], check=False)
     if done.returncode:
-        sys.exit("docs: the site was not built; mkdocs says above which page is wrong")
+        sys.exit("docs: the site was not built; the wrong page is named above")
     print(f"documentation: {arguments.out / 'index.html'}")
 
 

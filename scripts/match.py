@@ -69,7 +69,7 @@ class Member(NamedTuple):
 def main() -> int:
     """Play, say how it went."""
     args = parse()
-    told = received_signals(SIGNALS)
+    signals = received_signals(SIGNALS)
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
     rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
@@ -82,19 +82,19 @@ def main() -> int:
         board = Scoreboard(args.episodes, args.match_id, namespace=args.namespace)
         executor.add_node(board)
         play = play_in_one_process if args.single_process else play_in_processes
-        play(args, members(args, task), board, executor, told)
+        play(args, members(args, task), board, executor, signals)
     except (AgentError, KeepawayError, MatchError, OSError) as error:
         print(f"match: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:  # StoppedCompiling, where all nodes are in this process
         print("match: stopped while it compiled", file=sys.stderr)
-        return 128 + told[0]
+        return 128 + signals[0]
     finally:
         rclpy.try_shutdown()
     board.conclude()
     report(args, board.summary())
     ignore_signals(SIGNALS)
-    return 128 + told[0] if told else 0  # as shells expect it: 130 after Ctrl-C
+    return 128 + signals[0] if signals else 0  # as shells expect it: 130 after Ctrl-C
 
 
 def seat_agents(args: argparse.Namespace, task: Task) -> None:
@@ -212,7 +212,7 @@ def play_in_one_process(
     team: list[Member],
     board: Scoreboard,
     executor: Executor,
-    told: list[int],
+    signals: list[int],
 ) -> None:
     """All nodes here, taking turns."""
     options = [{"cli_args": each.arguments, "use_global_arguments": False} for each in team]
@@ -229,7 +229,7 @@ def play_in_one_process(
         board.show()
 
     try:
-        simulator.play(spin, lambda: bool(told))
+        simulator.play(spin, lambda: bool(signals))
     finally:
         simulator.close()
         for player in players:
@@ -241,7 +241,7 @@ def play_in_processes(
     team: list[Member],
     board: Scoreboard,
     executor: Executor,
-    told: list[int],
+    signals: list[int],
 ) -> None:
     """Every node its own process; ends when the simulator's does."""
     with Processes(os.environ) as processes:
@@ -254,7 +254,7 @@ def play_in_processes(
             processes.start(name, command)
         until = time.monotonic() + COMPILE_TIMEOUT
         is_found = False
-        while not told and "simulator" in processes.names:
+        while not signals and "simulator" in processes.names:
             executor.spin_once(0.1)
             board.show()
             for name, code in processes.ended():

@@ -49,7 +49,7 @@ def is_whole(path: Path) -> bool:
 
 
 def matches_in(reader: BagReader) -> Iterator[str]:
-    """What is missing of every match of a bag; a match that makes no sense is said to."""
+    """What is missing of every match of a bag; a match that cannot be read is named."""
     try:
         count = len(find_matches(reader))
     except KeepawayError as error:

@@ -5,7 +5,7 @@
     .venv/bin/python scripts/replay.py out/bag --topics match,keeper_1/perception
     .venv/bin/python scripts/replay.py out/bag --check
 
-In a terminal the space bar pauses, the right arrow or . goes one cycle on, + and - change the
+In a terminal the space bar pauses, the right arrow or . plays one cycle, + and - change the
 rate, and q ends it. With the third line a keeper's node (scripts/keeper.py) answers what it would
 have done; --start-delay 10 gives it time to get ready, and with --rate 4 it keeps up. --check plays
 nothing: the world and the players are made anew, and must do again what was recorded. What follows

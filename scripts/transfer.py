@@ -9,7 +9,8 @@
     .venv/bin/python scripts/transfer.py node --ros-args -r __ns:=/match_2
 
 Several tasks are a chain: rho from each to the next. A level in seconds behind a variant's name is
-what actions are worth on average: rho_shape@5 keeps how 3v2 tells states apart and nothing else.
+what actions are worth on average: rho_shape@5 keeps the order of states in 3v2 and nothing
+else.
 """
 
 import argparse

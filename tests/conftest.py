@@ -40,7 +40,7 @@ def root() -> Path:
 
 @pytest.fixture
 def full_disk() -> Iterator[Callable[[int], None]]:
-    """Lets no file of this process grow beyond so many bytes, as if the disk were full."""
+    """Lets no file of this process grow beyond N bytes, as if the disk were full."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -104,5 +104,5 @@ def simple_requests(seen: Belief, task: Task) -> tuple[np.ndarray, np.ndarray, l
 
 
 def in_play(world: World) -> bool:
-    """Whether field 0's episode goes on."""
+    """Whether field 0's episode is running."""
     return bool(world.belief.outcome[0] == Outcome.IN_PLAY)

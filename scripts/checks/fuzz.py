@@ -119,7 +119,7 @@ def time_limit() -> Iterator[None]:
 
 
 def interrupt(*_: object) -> None:
-    """Time is over."""
+    """The time is up."""
     raise HangError(f"more than {LONGEST} s")
 
 

@@ -48,14 +48,14 @@ def main() -> int:
 
 
 def play_match(args: argparse.Namespace, policy: str, folder: Path) -> dict[str, Any]:
-    """A match of nodes, as its JSON tells."""
+    """A match of nodes, as its JSON reports it."""
     command = [sys.executable, str(MATCH), "--json", "--task", args.task, "--seed", str(args.seed)]
     command += ["--episodes", str(args.episodes), "--keeper-policy", policy]
     command += ["--taker-policy", args.taker_policy, "--save-weights", str(folder)]
     command += ["--single-process"] if args.single_process else []
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-    told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return told
+    report: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return report
 
 
 def read_weights(folder: Path, task: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Nodes that die or freeze, disks that are full: the match goes on, and nothing saved is lost."""
+"""Nodes that die or freeze, disks that are full: the match continues, and nothing saved is lost."""
 
 import json
 import resource

@@ -178,7 +178,7 @@ def play(name: str, participant: DomainParticipant) -> None:
 
 
 def main() -> None:
-    """Play as the player whom ROS's arguments name, until told to end."""
+    """Play as the player that ROS's arguments name, until SIGINT or SIGTERM."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
     named = re.search(r"__node:=(\S+)", " ".join(sys.argv))

@@ -24,11 +24,11 @@ class SmallestAgent(Node):
         self.create_subscription(Perception, f"{name}/perception", self.on_perception, 10)
 
     def on_match(self, match: Match) -> None:
-        """Take a place in a new match, and say that it is ready."""
+        """Take a place in a new match, and publish that it is ready."""
         name, self.match = self.get_name(), match
         self.index = match.player_names.index(name)
-        said = AgentStatus(player_index=self.index, name=name, policy="mine", ready=True)
-        self.status.publish(said)
+        status = AgentStatus(player_index=self.index, name=name, policy="mine", ready=True)
+        self.status.publish(status)
 
     def on_perception(self, seen: Perception) -> None:
         """Answer what is due, by its episode and cycle."""
@@ -50,7 +50,7 @@ class SmallestAgent(Node):
 
 
 def main(agent=SmallestAgent):
-    """Play until told to end (SIGINT, SIGTERM)."""
+    """Play until SIGINT or SIGTERM."""
     rclpy.init()
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(agent())

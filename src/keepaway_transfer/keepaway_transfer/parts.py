@@ -13,7 +13,7 @@ is then the sum of three::
                 level      shape              preferences
 
 and because Q is linear in the weights, so is every value the sum of three values: the level L, the
-same in every state for every action; the shape, which tells states apart, is the same for all
+same in every state for every action; the shape, which differs between states, is the same for all
 actions and has the mean 0 over the sample; and the preferences, which tell actions apart and sum to
 0 over them in every state.
 

@@ -23,7 +23,7 @@ def fail(words: str) -> None:
 
 
 def be_killed(folder: Path, times: int) -> int:
-    """Be killed so many times; then how often that was."""
+    """Be killed N times; then the number of deaths."""
     already = len(list(folder.iterdir()))
     if already < times:
         (folder / str(already)).touch()

@@ -54,7 +54,7 @@ def judge(log: Sequence[Exchange], name: str, exit_code: int | None) -> list[Ver
     Args:
         log: of the whole script.
         name: of the player.
-        exit_code: with which the agent ended when told to; None: it did not, and was killed.
+        exit_code: with which the agent ended on the signal; None: it did not, and was killed.
     """
     said = [each.ready for each in log if isinstance(each.step, ScriptedMatch)]
     left = "did not end and was killed" if exit_code is None else f"exit code {exit_code}"

@@ -3,10 +3,10 @@
 With Gymnasium, and with PettingZoo as "parallel" and as "aec"; `KeepawayTurns-v0` is "aec" as well.
 
 ============================  =======================================================
-`KeeperEnv`                   one field; whichever keeper has the choice is the agent
+`KeeperEnv`                   one field; the keeper that has the choice is the agent
 `KeeperVectorEnv`             the same for many fields of one `World`, next-step reset
-`KeepawayAECEnv`              one field, turn by turn: who has a choice is selected
-`KeepawayParallelEnv`         one field, cycle by cycle: all act, most of them "nothing"
+`KeepawayAECEnv`              one field, turn by turn: an agent with a choice is selected
+`KeepawayParallelEnv`         one field, cycle by cycle: all act, most of them by "nothing"
 `keepaway_v0`                 the last two as PettingZoo's modules offer theirs
 ============================  =======================================================
 """

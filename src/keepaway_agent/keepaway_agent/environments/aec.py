@@ -20,13 +20,13 @@ from keepaway_agent.environments.snapshots import TurnState, require_kind
 
 
 class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
-    """One field, turn by turn: who has a choice is selected, and time stands still meanwhile.
+    """One field, turn by turn: an agent with a choice is selected, and simulated time waits for it.
 
     A keeper chooses between holding the ball (0) and passing to K(k+1) (k), when it can kick the
     ball; a taker between going to the ball (0) and marking K(k+1) (k), every five cycles. All
     choose on what they believe at the same moment, and then the field plays on to the next
     choice. Every cycle pays 1 to each keeper and -1 to each taker, so what `last` gives an agent
-    is the reward since its own last choice: what a learner of Taylor & Stone (2005) is paid.
+    is the reward since its own last choice, as for a learner of Taylor & Stone (2005).
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -47,8 +47,8 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         """Lay out the field.
 
         Args:
-            teams: who are agents: keepers, takers or both.
-            max_cycles: an episode is cut off (truncated) at the first choice after so many.
+            teams: that are agents: keepers, takers or both.
+            max_cycles: the first choice after them truncates the episode; None: never.
             render_mode: None, rgb_array, rgb_array_list or human.
             settings: those of `DecisionFields` but for the number of fields.
 
@@ -72,7 +72,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Kick off, with the random numbers of `seed` or going on with those in use.
+        """Kick off, with the random numbers of `seed` or continuing those in use.
 
         Raises:
             InvalidSeedError, ClosedError: see `refusals`.
@@ -87,7 +87,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         self.truncations = dict.fromkeys(self.agents, False)
         self.infos: dict[str, dict[str, Any]] = {name: {} for name in self.agents}
         self._choices = {}
-        self._tell_cycle()
+        self._note_cycle()
         self._select()
 
     def observe(self, agent: str) -> np.ndarray:
@@ -100,7 +100,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         return self._field.observe(agent)
 
     def last(self, observe: bool = True) -> Any:
-        """What the selected agent sees, its reward since its last choice, and how things are.
+        """The selected agent's observation, reward since its last choice, and whether it finished.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -109,7 +109,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         return super().last(observe)
 
     def agent_iter(self, max_iter: int = 2**63) -> AECIterable[str, np.ndarray, int]:
-        """The agents as they get to choose.
+        """The agents in the order of their choices.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -139,7 +139,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         self._select()
 
     def get_state(self) -> TurnState:
-        """What there is of the field and of the turns now, as a copy: plain data.
+        """The state of the field and of the turns now, as a copy: plain data.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -149,7 +149,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         return TurnState(field, self.agents[:], self.agent_selection, dict(self._choices), books)
 
     def set_state(self, state: TurnState, seed: int | None = None) -> None:
-        """Go on from a state; with random numbers from a seed, or those of the state.
+        """Continue from a state; with random numbers from a seed, or those of the state.
 
         Raises:
             AgentError, KeepawayError, ClosedError: no such state, or one of another world.
@@ -170,7 +170,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         return self.rewards, sums, self.terminations, self.truncations, self.infos
 
     def _play_on(self) -> None:
-        """Let all choices of a moment come into force, and play to the next ones."""
+        """Apply all choices of a moment, and play to the next ones."""
         self._field.choose(self._choices)
         self._choices = {}
         cycles = self._field.play_to_choice(until_the_end=True)
@@ -179,9 +179,9 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
         late = not over and self._field.cycle >= self.max_cycles
         self.terminations = dict.fromkeys(self.agents, over)
         self.truncations = dict.fromkeys(self.agents, late)
-        self._tell_cycle()
+        self._note_cycle()
 
-    def _tell_cycle(self) -> None:
+    def _note_cycle(self) -> None:
         for name in self.agents:
             self.infos[name] = {"cycle": self._field.cycle}
 

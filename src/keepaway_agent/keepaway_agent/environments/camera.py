@@ -21,7 +21,7 @@ class Camera:
     """Follows fields cycle by cycle, if there is a render mode; else it costs nothing."""
 
     def __init__(self, fields: DecisionFields, render_mode: str | None) -> None:
-        """Stand by; frames are drawn when they are asked for."""
+        """Prepare; frames are drawn on request."""
         self._fields, self._mode = fields, render_mode
         self._balls: deque[np.ndarray] = deque(maxlen=TRAIL + 1)  # (num_fields, 2) [m]
         self._film: deque[Moment] = deque(maxlen=MAX_KEPT)
@@ -39,7 +39,7 @@ class Camera:
             self._show(self.frame(0))
 
     def render(self) -> Any:
-        """Of field 0, as the render mode says."""
+        """A frame or frames of field 0, by the render mode."""
         if self._mode == "rgb_array":
             return self.frame(0)
         if self._mode == "rgb_array_list":

@@ -89,9 +89,9 @@ def rank_as_taker(d, f, p):
 
 
 class Play(NamedTuple):
-    """What `play` goes by, of every field; each (num_fields,)."""
+    """The arguments of `play` for every field; each (num_fields,)."""
 
-    moving: np.ndarray  # bool, time goes by, and there has been nothing to stop for yet
+    moving: np.ndarray  # bool, it is played, and has had nothing to stop for yet
     in_play: np.ndarray  # bool, the end of the episode is something to stop for as well
     left: np.ndarray  # int64, cycles to play at most
     cycles: np.ndarray  # int64, counts those that are played
@@ -99,11 +99,11 @@ class Play(NamedTuple):
 
 @compiled_apart
 def play(w, d, outside, latest, choosing, plays):
-    """Play every moving field on, each at its own pace, as far as it goes without outside help.
+    """Play every moving field on, each at its own pace, as far as possible in compiled code.
 
-    A field stops where somebody has a choice to make from outside. It waits where discs may touch:
-    then they are to be moved (`Bodies.move`); and where random numbers run short. After that, this
-    is called again.
+    A field stops where a player has a choice to make from outside. It waits where discs may touch,
+    until they are moved (`Bodies.move`), and where random numbers run short. Then this is called
+    again.
 
     Args:
         w: Fields of the World.

@@ -42,8 +42,8 @@ OUTSIDE: Final = "outside"
 RULES: Final = ("random", "hold", "hand")
 """Policies of a team that plays by itself; takers cannot hold."""
 PATIENCE: Final = 100_000
-"""Cycles without a choice after which a world is given up: nobody in it gets anywhere."""
-_STUCK: Final = f"nobody has had a choice for {PATIENCE} cycles: check config"
+"""Cycles without a choice after which a world is given up."""
+_STUCK: Final = f"no player has had a choice for {PATIENCE} cycles: check config"
 _STAND_INS: Final = {Role.KEEPER: "hold", Role.TAKER: "random"}
 """What asks for a choice where a learner would; the choice from outside replaces its own."""
 
@@ -54,7 +54,7 @@ class DecisionFields:
     Attributes:
         task: what is played.
         num_fields: side by side.
-        choosing: (num_fields, num_players) bool, who has a choice to make from outside now.
+        choosing: (num_fields, num_players) bool, players with a choice to make from outside.
         watchers: called after every kick-off and every cycle that was played.
     """
 
@@ -74,8 +74,8 @@ class DecisionFields:
         Args:
             task: keepers v takers, on 25 m x 25 m; or a Task.
             num_fields: played side by side.
-            keeper_policy: outside, or who plays by itself: random, hold or hand.
-            taker_policy: outside, or random or hand.
+            keeper_policy: outside, or a rule: random, hold or hand.
+            taker_policy: outside, or a rule: random or hand.
             config: of the world.
             ordering: what ranks players in keepers' variables, ball or k1.
             decision_interval: cycles between a taker's choices.
@@ -127,7 +127,7 @@ class DecisionFields:
         }
 
     def _make_deciders(self, shape: tuple[int, int]) -> Deciders:
-        """The players; those from outside have a stand-in, and nobody learns."""
+        """The players; those from outside have a stand-in, and none learns."""
         policy = np.full(shape, self._keeper.policy)
         policy[:, self.task.num_keepers :] = self._taker.policy
         return Deciders(
@@ -147,7 +147,7 @@ class DecisionFields:
     def _make_learners(self, role: Role) -> sarsa.Learners:
         n, m = self.task.num_keepers, self.task.num_takers
         size = n if role == Role.KEEPER else m
-        count = self.num_fields * size  # of one table, which nobody reads or writes
+        count = self.num_fields * size  # of one table, which is never read or written
         return sarsa.make_learners(count, n, make_tiling(role, n, m), None, count)
 
     @property
@@ -182,7 +182,7 @@ class DecisionFields:
         return self._is_started
 
     def require_open(self) -> None:
-        """Refuse whatever comes after `close`.
+        """Refuse calls after `close`.
 
         Raises:
             ClosedError: these fields were closed.
@@ -224,7 +224,7 @@ class DecisionFields:
         self.choosing[fields] = False
 
     def choose(self, choices: np.ndarray) -> None:
-        """Make choices: (num_fields, num_players) int64, NO_CHOICE for who makes none.
+        """Make choices: (num_fields, num_players) int64, NO_CHOICE for players who make none.
 
         A keeper's choice is 0 to hold the ball or k to pass to K(k+1); a taker's 0 to go to the
         ball or k to mark K(k+1).
@@ -233,7 +233,7 @@ class DecisionFields:
         self.choosing[choices != NO_CHOICE] = False
 
     def step(self, moved: np.ndarray) -> None:
-        """Play a cycle on the fields of (num_fields,) `moved`; time stands still on the others."""
+        """Play a cycle on the fields of (num_fields,) `moved`; the others wait."""
         self._advance(self._plays(moved, self._nowhere, self._uncounted), 1)
 
     def play_on(self, moved: np.ndarray, in_play: np.ndarray, cycles: np.ndarray) -> None:
@@ -246,7 +246,7 @@ class DecisionFields:
             cycles: (num_fields,) int64, those that are played are added.
 
         Raises:
-            AgentError: nobody gets a choice; the world's constants leave nobody a game.
+            AgentError: no player gets a choice; with these constants no match can be played.
         """
         plays = self._plays(moved, in_play, cycles)
         most = 1 if self.watchers else PATIENCE
@@ -301,7 +301,7 @@ class DecisionFields:
         self._observe[role](who, self._high[role], self._state[role], into)
 
     def get_state(self, field: int) -> FieldState:
-        """All there is of a field now, random numbers included, as a copy.
+        """The whole state of a field now, random numbers included, as a copy.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -319,7 +319,7 @@ class DecisionFields:
         )
 
     def set_state(self, field: int, state: FieldState) -> None:
-        """Go on from a state, of this field or another of the same task and configuration.
+        """Continue from a state, of this field or another of the same task and configuration.
 
         Raises:
             AgentError, KeepawayError, ClosedError: no such state, or one of another world.

@@ -1,11 +1,11 @@
-"""The keepers' decision problem for learners from elsewhere: Gymnasium environments.
+"""The keepers' decision problem as Gymnasium environments.
 
 A keeper that can kick the ball chooses: 0 holds it, k passes to K(k+1). It sees the 4n + 2m - 3
-state variables of `features.keeper_state` as it believes them to be. Whoever has no choice to make
-follows the rules of `policies`, and so do the takers. One cycle in play pays 1, and cycles go by
-between two choices: the problem is a semi-Markov one, and `infos` contain how many (Taylor & Stone
-2005). The world is that of the trainer: field k of a reset with seed s plays what trial k of a
-training with seed s plays.
+state variables of `features.keeper_state` as it believes them to be. Keepers without a choice
+follow the rules of `policies`, and so do the takers. One cycle in play pays 1, and cycles pass
+between two choices: the problem is a semi-Markov one, and `infos` contain their number (Taylor &
+Stone 2005). The world is that of the trainer: field k of a reset with seed s plays what trial k of
+a training with seed s plays.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Lay out the fields.
 
         Args:
-            num_envs: how many.
+            num_envs: the number of fields.
             wait_for: a step ends when there is a choice on all of them, or on any.
-            max_episode_steps: choices after which an episode is cut off (truncated).
+            max_episode_steps: choices after which an episode is truncated.
             render_mode: None or rgb_array: `render` gives a frame of every field.
             settings: task, taker_policy, config, ordering: see `DecisionFields`.
 
@@ -135,7 +135,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
         Args:
             seed: of all random numbers; a list has one for each field, as that of a single
-                environment. None goes on with the random numbers in use.
+                environment. None continues the random numbers in use.
             options: none is known; they are ignored.
 
         Raises:
@@ -190,7 +190,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return (*results[:4], self._infos(results))
 
     def _results(self) -> Results:
-        """What a step gives; episodes that are long enough are cut off."""
+        """The results of a step; episodes of the maximum length are truncated."""
         size = self.num_envs
         results = Results(
             np.empty((size, len(self._for_results[1])), dtype=np.float32),
@@ -208,7 +208,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return results
 
     def get_state(self) -> list[KeeperState]:
-        """What there is of every field now, as copies: plain data for `set_state`.
+        """The state of every field now, as copies: plain data for `set_state`.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -228,7 +228,7 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
         Args:
             states: one for each field; some may be the same.
-            seeds: of all random numbers from now on, one for each field; None goes on with
+            seeds: of all random numbers from now on, one for each field; None continues
                 those of the state, so that equal choices give equal play.
 
         Returns:
@@ -309,7 +309,7 @@ class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Kick off, with the random numbers of `seed` or going on with those in use.
+        """Kick off, with the random numbers of `seed` or continuing those in use.
 
         Raises:
             InvalidSeedError, ClosedError: see `refusals`.
@@ -338,7 +338,7 @@ class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
         return state[0], float(reward[0]), self._is_over, False, first_of(infos)
 
     def get_state(self) -> KeeperState:
-        """What there is of the field now, as a copy; see `KeeperVectorEnv.get_state`."""
+        """The state of the field now, as a copy; see `KeeperVectorEnv.get_state`."""
         return self._env.get_state()[0]
 
     def set_state(
@@ -351,7 +351,7 @@ class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
         return observations[0], first_of(infos)
 
     def render(self) -> Any:
-        """As the render mode says; None without one, and in a window.
+        """A frame or frames, by the render mode; None without one, and in a window.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.

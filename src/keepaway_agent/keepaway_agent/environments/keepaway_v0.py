@@ -1,7 +1,7 @@
 """Keepaway as PettingZoo's modules offer their environments.
 
-`parallel_env` goes cycle by cycle; `env` is the same as an AEC environment; `turn_based_env` goes
-from choice to choice, and asks nobody who has none to make.
+`parallel_env` steps cycle by cycle; `env` is the same as an AEC environment; `turn_based_env` steps
+from choice to choice, and selects only agents that have one.
 """
 
 from __future__ import annotations

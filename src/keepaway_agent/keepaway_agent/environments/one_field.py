@@ -19,7 +19,7 @@ from keepaway_agent.playing.policies import KEEPER_REWARD, TAKER_REWARD
 from keepaway_agent.training.trial import trial_seed
 
 TEAMS: Final = ("keepers", "takers", "both")
-"""Who are agents; the others play by a rule."""
+"""The teams that are agents; the other team plays by a rule."""
 
 
 class OneField:
@@ -75,11 +75,11 @@ class OneField:
         return Role.KEEPER if is_keeper else Role.TAKER
 
     def reward(self, name: str) -> float:
-        """What a cycle in play pays an agent."""
+        """An agent's reward for a cycle in play."""
         return KEEPER_REWARD if self.role(name) == Role.KEEPER else TAKER_REWARD
 
     def start(self, seed: int | None) -> None:
-        """Kick off: with the random numbers of a seed, or going on with those in use."""
+        """Kick off: with the random numbers of a seed, or continuing those in use."""
         self.fields.require_open()
         chosen = checked_seed(seed)
         if chosen is None and self.fields.is_started:
@@ -89,7 +89,7 @@ class OneField:
             self.fields.start(0, trial_seed(np.random.SeedSequence(chosen).entropy, 0))  # type: ignore[arg-type]
 
     def set_state(self, state: FieldState, seed: int | None) -> None:
-        """Go on from a state; with random numbers from a seed, or those of the state."""
+        """Continue from a state; with random numbers from a seed, or those of the state."""
         self.fields.set_state(0, state if seed is None else with_new_luck(state, seed))
 
     def play_to_choice(self, *, until_the_end: bool) -> int:
@@ -155,7 +155,7 @@ class OneFieldEnv:
     """What is the same whether agents act in turn or at once: the field, its truth, its pictures.
 
     Attributes:
-        max_cycles: an episode is cut off (truncated) after so many.
+        max_cycles: after which an episode is truncated.
         render_mode: None or one of `OneField.RENDER_MODES`.
         possible_agents, agents: names of all, and of those that have not finished.
         state_space: of `state`.
@@ -183,7 +183,7 @@ class OneFieldEnv:
         return self._field.state()
 
     def render(self) -> Any:
-        """As the render mode says; None without one, and in a window.
+        """A frame or frames, by the render mode; None without one, and in a window.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.

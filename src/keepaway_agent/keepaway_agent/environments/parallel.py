@@ -1,4 +1,4 @@
-"""PettingZoo, cycle by cycle: every player acts at once; who has no choice does nothing."""
+"""PettingZoo, cycle by cycle: all players act at once; those without a choice do nothing."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
     """One field, a cycle of 0.1 s a step: all agents act at once.
 
     Players decide at different moments. So there is one action more than choices, "nothing", and
-    an agent's observation has a mask: either all choices, or nothing alone. Whoever chooses where
-    the mask forbids it is not refused (random agents do so): a choice out of turn does nothing,
+    an agent's observation has a mask: either all choices, or nothing alone. An action that the mask
+    forbids is not refused (random agents choose such actions): a choice out of turn does nothing,
     and nothing in place of a choice holds the ball, or lets a taker choose again a cycle later.
     """
 
@@ -48,8 +48,8 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
         """Lay out the field.
 
         Args:
-            teams: who are agents: keepers, takers or both.
-            max_cycles: an episode is cut off after so many; None: never.
+            teams: that are agents: keepers, takers or both.
+            max_cycles: after which an episode is truncated; None: never.
             render_mode: None, rgb_array, rgb_array_list or human.
             settings: those of `DecisionFields` but for the number of fields.
 
@@ -72,7 +72,7 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
 
     @property
     def nothing(self) -> int:
-        """The action of who has no choice to make."""
+        """The action of agents without a choice."""
         return self._num_choices
 
     def observation_space(self, agent: str) -> spaces.Dict:
@@ -88,7 +88,7 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Kick off, with the random numbers of `seed` or going on with those in use.
+        """Kick off, with the random numbers of `seed` or continuing those in use.
 
         Raises:
             InvalidSeedError, ClosedError: see `refusals`.
@@ -129,7 +129,7 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
         return results
 
     def get_state(self) -> CycleState:
-        """What there is of the field now, as a copy: plain data.
+        """The state of the field now, as a copy: plain data.
 
         Raises:
             ResetNeededError, ClosedError: see `refusals`.
@@ -139,7 +139,7 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
     def set_state(
         self, state: CycleState, seed: int | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Go on from a state; with random numbers from a seed, or those of the state.
+        """Continue from a state; with random numbers from a seed, or those of the state.
 
         Returns:
             observations and infos, as of `reset`.
@@ -152,7 +152,7 @@ class KeepawayParallelEnv(OneFieldEnv, ParallelEnv[str, Observation, int]):
         return self._observations(), self._infos()
 
     def _choices(self, actions: Any) -> dict[str, int]:
-        """Choices that come into force: those of agents who have one to make."""
+        """Choices that take effect: those of agents that have one to make."""
         if not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise InvalidActionError(
                 f"actions={actions!r:.60}: give one for each of {', '.join(self.agents)}"

@@ -1,7 +1,7 @@
-"""What environments write down of a moment, so that play can be continued from it.
+"""Snapshots of environments, from which play can be continued.
 
 A snapshot is plain data: it can be pickled, kept, and put into any environment of the same task
-and configuration, as often as one likes. Equal choices after it give equal play, bit for bit.
+and configuration, any number of times. Equal choices after it give equal play, bit for bit.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class CycleState(NamedTuple):
 def with_new_luck(state: FieldState, seed: int) -> FieldState:
     """The same moment, with all random numbers from now on drawn from a seed.
 
-    For planners: without it a rollout meets the very noise that the real play is going to meet.
+    For planners: without it a rollout meets exactly the noise that the real play will meet.
     """
     checked = checked_seed(seed)
     children = np.random.SeedSequence(checked).spawn(1 + len(state.streams))

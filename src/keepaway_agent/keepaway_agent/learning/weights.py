@@ -31,7 +31,7 @@ from keepaway_agent.texts import one_line, shown
 FORMAT: Final = "keepaway-weights"
 FORMAT_VERSION: Final = 1
 HOURS_PER_CYCLE: Final = 0.1 / 3600
-"""Simulated time is counted in cycles of 0.1 s and told in hours."""
+"""Simulated time is counted in cycles of 0.1 s and reported in hours."""
 MAX_BYTES: Final = 2**26
 """The largest array that is read; eleven against eleven on 100 m x 100 m takes a fifth of it."""
 MAX_METADATA_BYTES: Final = 2**20

@@ -26,7 +26,7 @@ Spin = Callable[[float], None]
 
 
 class ScriptedSimulator(Node):
-    """Says a script's steps to one agent.
+    """Publishes a script's steps to one agent.
 
     Attributes:
         log: an `Exchange` for every step sent so far.

@@ -75,7 +75,7 @@ def check_config(role: Role, config: AgentConfig) -> None:
     """Refuse settings that make no player of this role, before there is a match.
 
     Raises:
-        AgentError: says which, and what to give instead.
+        AgentError: names the setting, and what to give instead.
     """
     index = 0 if role == Role.KEEPER else 2
     make_player(index, 2, config.policy, config.learner.ordering, config.decision_interval)
@@ -157,7 +157,7 @@ class Agent:
         return self.facts.role(self.index)
 
     def use(self, weights: LearnedWeights) -> None:
-        """Go on from weights that were learned before.
+        """Continue from weights that were learned before.
 
         Raises:
             WeightsError: weights for something else than this player does here.

@@ -1,7 +1,7 @@
 """What happened in a recorded match: a row for every episode, passes, losses, actions; and figures.
 
 A bag is read moment by moment, and the rows are written as they are made: memory does not grow
-with the bag but by a few numbers an episode. What rests on messages that are missing is not told:
+with the bag but by a few numbers an episode. What depends on missing messages is not counted:
 passes, and where the ball was, only of episodes whose field states are all there.
 """
 
@@ -71,7 +71,7 @@ class _Partial:
 
     def is_whole(self, episode: EpisodeSummary) -> bool:
         """Whether every one of the episode's field states came."""
-        aborted = episode.outcome == Outcome.ABORTED  # then the last cycle is told twice
+        aborted = episode.outcome == Outcome.ABORTED  # then the last cycle is published twice
         return self.ball is not None and self.states == episode.cycles + 1 + aborted
 
 

@@ -1,4 +1,4 @@
-"""Signals that ask a program to end: it saves what is finished, and says so with its exit code.
+"""Signals that ask a program to end: it saves what is finished, and exits with their code.
 
 Ctrl-C (SIGINT), `kill` (SIGTERM) and a closed terminal (SIGHUP) do the same: they raise `Stopped`
 where the program is. A second one that follows soon, as when a terminal and a shell both send it,

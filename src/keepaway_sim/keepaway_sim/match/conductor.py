@@ -77,7 +77,7 @@ class Conductor:
 
     Attributes:
         world, settings: what is played; settings may be replaced while the match is running.
-        match_id: what tells its messages from those of every other match.
+        match_id: identifies its messages among those of other matches.
         roster: who plays.
         recorders: how far those that record it have come.
         is_running: false while it pauses.

@@ -1,9 +1,9 @@
 """Who plays, and whose answers are in: what a simulator knows of players it cannot trust. No ROS.
 
 Players are processes: they come late, die, freeze, come back, and any process may send anything in
-their name. A seat is *absent* until its player says that it is ready, then *present*: its answers
-are waited for. One that does not answer for `answer_timeout` is absent again and gets default
-actions; when it speaks again it is present from the next kick-off on.
+their name. A seat is *absent* until its player reports that it is ready, then *present*: its
+answers are waited for. One that does not answer for `answer_timeout` is absent again and gets
+default actions; when it answers again it is present from the next kick-off on.
 """
 
 from __future__ import annotations

@@ -37,9 +37,7 @@ class MatchSettings:
     first_episode: int = setting(
         0, "its number, to continue a match whose simulator died", "", "[0, 1000000000]"
     )
-    match_id: int = setting(
-        0, "tells this match from every other one; 0: drawn at random", "", f"[0, {MOST}]"
-    )
+    match_id: int = setting(0, "identifies this match; 0: drawn at random", "", f"[0, {MOST}]")
     answer_timeout: float = setting(
         2.0, "wall time after which a player who has not answered is unresponsive", "s", "(0, 3600]"
     )

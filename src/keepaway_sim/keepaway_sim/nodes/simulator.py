@@ -81,7 +81,7 @@ class Simulator(Node):
         self.conductor.announce()
 
     def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
-        """Play until all episodes have ended, or it is told to, or ROS is shut down."""
+        """Play until all episodes have ended, or a signal comes, or ROS is shut down."""
         self.conductor.play(spin, lambda: is_told_to_end() or not self.context.ok())
         if self.context.ok():
             self.conductor.take_leave()

@@ -17,7 +17,7 @@ EVERY_CYCLE = Qos(100)  # what is not taken in time is missed
 
 
 class Spectator(Node):
-    """Hears a match, from its description on, and feeds it to a live page."""
+    """Subscribes to a match, from its description on, and feeds it to a live page."""
 
     def __init__(self, live: LiveMatch, **node_options: Any) -> None:
         """Listen to the match; to its players once it has named them."""

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from keepaway_sim.match.roster import Seat
 
-RECOVERY = 10.0  # [s] without anything new after which a player's trouble is over
+RECOVERY = 10.0  # [s] without anything new after which a player's warning ends
 
 
 def diagnostics(

@@ -1,6 +1,6 @@
-"""A match that is on, for browsers: its messages made into the page's events, and a small server.
+"""A running match, for browsers: its messages made into the page's events, and a small server.
 
-The server speaks to this machine only, unless told otherwise, and answers only requests that
+The server listens on this machine only, by default, and answers only requests that
 name it as their host and come from its own page. Events go over one long HTTP answer for each
 browser (server-sent events); a browser that is slow misses cycles; no other waits for it.
 """
@@ -26,7 +26,7 @@ from keepaway_sim.wire.cdr import codec
 from keepaway_sim.world.config import NEVER
 
 FRAME_PERIOD = 0.05  # [s] browsers are not sent more moments
-KEPT_EPISODES = 100_000  # told to browsers that come later
+KEPT_EPISODES = 100_000  # sent to browsers that connect later
 
 Event = tuple[str, str]
 """Its kind, and its data as JSON: match, frame or episode."""
@@ -61,7 +61,7 @@ class LiveMatch:
         """Take a message.
 
         Returns:
-            the names of the players, if it was a Match that tells them.
+            the names of the players, if it was a Match.
 
         Raises:
             KeepawayError: bytes that are not such a message, or not one of this match.

@@ -101,7 +101,7 @@ def match_data(
 
     Args:
         match: a Match message's fields.
-        facts: more to be told of it.
+        facts: more to show of it.
         agents: the settings of every player, by name, where they are known.
 
     Raises:

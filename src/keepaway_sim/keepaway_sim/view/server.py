@@ -105,7 +105,7 @@ class Server:
     def _broadcast(self, event: Event) -> None:
         with self._lock:
             for events in self._browsers:
-                if event[0] == "match":  # whatever was before it is over
+                if event[0] == "match":  # events before it are of another match
                     with events.mutex:
                         events.queue.clear()
                 with contextlib.suppress(queue.Full):

@@ -61,7 +61,7 @@ def definition(message_type: str) -> str:
 
 @functools.cache
 def type_hash(message_type: str) -> str:
-    """The hash by which ROS 2 tells two versions of a type apart (REP-2011): "RIHS01_..." .
+    """The hash by which ROS 2 distinguishes two versions of a type (REP-2011): "RIHS01_..." .
 
     Raises:
         KeepawayError: a type whose package is not installed.

@@ -19,7 +19,7 @@ WORDS = {
     "none": "the same with",
     "open": "not decided for",
 }
-"""What is said of rows by the first word of their verdicts."""
+"""The words for rows by the first word of their verdicts."""
 
 
 def elsewhere() -> dict[str, Any]:

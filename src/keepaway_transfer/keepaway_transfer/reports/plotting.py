@@ -151,13 +151,13 @@ def intervals(
 
 
 def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
-    """Distribution of episode durations: the share of episodes still going on.
+    """Distribution of episode durations: the share of episodes still running.
 
     Args:
         groups: label -> durations [s] of first episodes (dotted) and of last ones.
         title: above the axes.
     """
-    figure, axes = _figure(title, "Time since kick-off (s)", "Share of episodes still going on")
+    figure, axes = _figure(title, "Time since kick-off (s)", "Share of episodes still running")
     for (label, (first, last)), colour in zip(groups.items(), _colours(len(groups)), strict=True):
         starts, ends = (np.sort(np.asarray(one, dtype=np.float64)) for one in (first, last))
         label = f"{label} (mean {starts.mean():.1f} s, then {ends.mean():.1f} s)"
@@ -174,7 +174,7 @@ def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> 
 
 
 def save_figure(figure: Figure, path: Path | str, made_by: str) -> None:
-    """Write a PNG that tells what made it: study, settings, seed, version."""
+    """Write a PNG that names what made it: study, settings, seed, version."""
     figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
     figure.savefig(path, dpi=150, metadata={"Description": made_by})
 

@@ -78,7 +78,7 @@ class Record:
 
     @property
     def key(self) -> tuple[str, int]:
-        """What tells this trial from all others of its study."""
+        """Identifies this trial among all of its study."""
         return self.row, self.number
 
     @property

@@ -61,7 +61,7 @@ class StudyTrial:
 
     @property
     def key(self) -> tuple[str, int]:
-        """What tells this trial from all others of its study."""
+        """Identifies this trial among all of its study."""
         return self.row, self.number
 
 

@@ -8,7 +8,7 @@ const NONE = -32768, PASS = 1, MARK = 4;
 const TRAIL = 25; // cycles
 const GLANCE = 4; // metres to which the views of players who are not chosen are drawn
 const MARGIN = 1.6; // metres around the field
-const KNOWN_AGE = 12; // cycles; players forget where somebody is who was not seen for longer
+const KNOWN_AGE = 12; // cycles; players forget places of players not seen for longer
 const $ = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -29,8 +29,8 @@ const view = {
 
 /** An episode of the list; what it looked like is unpacked when it is watched. */
 function addEpisode(entry) {
-  const { frames: text, ...told } = entry;
-  const episode = { ...told, playable: Boolean(text), frames: [] };
+  const { frames: text, ...rest } = entry;
+  const episode = { ...rest, playable: Boolean(text), frames: [] };
   if (text) whenAskedFor(episode, "frames", () => framesOf(text, match.frame_size));
   byNumber.set(episode.number, episodes.length);
   episodes.push(episode);
@@ -72,7 +72,7 @@ function angle(name, player) {
 
 const nowFrame = () => current().frames[Math.min(Math.floor(view.frame + 1e-6), lastFrame())];
 
-/** What a player does: its request in this cycle, or what it was told to do before. */
+/** What a player does: its request in this cycle, or its last request. */
 function doing(frame, player) {
   const asked = field(frame, "requested", player);
   const name = asked >= 0 ? ["requested", "requested_target"] : ["action", "target"];
@@ -273,9 +273,9 @@ function tell() {
   const outcome = field(frame, "outcome");
   $("banner").hidden = !outcome;
   $("banner").textContent = `Episode ${episode.number}: ${OUTCOMES[outcome]} after ${seconds(frame).toFixed(1)} s`;
-  const says = match.names.map((name, player) => `${name.replace("_", " ")} ${inWords(doing(frame, player))}`);
-  canvas.setAttribute("aria-label", `Episode ${episode.number}, ${seconds(frame).toFixed(1)} s: ${says.join("; ")}`);
-  says.forEach((_, player) => { $("players").children[player].lastChild.textContent = shortAction(frame, player); });
+  const descriptions = match.names.map((name, player) => `${name.replace("_", " ")} ${inWords(doing(frame, player))}`);
+  canvas.setAttribute("aria-label", `Episode ${episode.number}, ${seconds(frame).toFixed(1)} s: ${descriptions.join("; ")}`);
+  descriptions.forEach((_, player) => { $("players").children[player].lastChild.textContent = shortAction(frame, player); });
   tellMind(frame);
 }
 
@@ -287,11 +287,11 @@ function shortAction(frame, player) {
 
 const nick = (player) => (isKeeper(player) ? "K" : "T") + match.names[player].split("_").pop();
 
-let mindTold = null;
+let shownMind = null;
 function tellMind(frame) {
-  const told = `${view.player} ${current().number} ${cycleOf(frame)}`;
-  if (told === mindTold) return;
-  mindTold = told;
+  const key = `${view.player} ${current().number} ${cycleOf(frame)}`;
+  if (key === shownMind) return;
+  shownMind = key;
   const mind = $("mind"), me = view.player;
   mind.replaceChildren();
   if (me < 0) {
@@ -480,7 +480,7 @@ function select(k, frame = 0) {
   view.episode = k;
   view.frame = frame;
   view.following = false;
-  mindTold = null;
+  shownMind = null;
   reveal();
   refresh();
 }
@@ -529,7 +529,7 @@ function advance(time) {
   requestAnimationFrame(advance);
 }
 
-/** Go on by so many cycles; at an episode's end wait a moment, then play the next one. */
+/** Advance by N cycles; at an episode's end wait a moment, then play the next one. */
 let waited = 0;
 function step(cycles) {
   if (view.frame < lastFrame()) {
@@ -547,7 +547,7 @@ function step(cycles) {
 function choosePlayer(player) {
   if (!match || player >= match.names.length) return;
   view.player = player;
-  mindTold = null;
+  shownMind = null;
   [...$("players").children].forEach((button, k) => button.setAttribute("aria-checked", k === player));
   draw();
   if (player < 0) $("mind").replaceChildren(paragraph("Choose a player to see what it knows and wants."));
