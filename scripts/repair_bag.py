@@ -16,7 +16,7 @@ from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.matches import find_matches
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import KeepawayError, one_line
 
 
 def main() -> int:
@@ -30,7 +30,7 @@ def main() -> int:
         made = repair(args.bag, output)
         print(f"{output}: {made.message_count} messages")
         for problem in made.problems:
-            print(problem)
+            print(one_line(problem))
         for line in matches_in(made):
             print(line)
     except KeepawayError as error:

@@ -23,7 +23,11 @@ from keepaway_sim.wire.messages import MATCH
 
 NUMBERS = (-1, 0, 1, 3, 99, 255, 2**15, 2**31, 2**32 - 1, 2**63, 2**64 - 1)
 FLOATS = (0.0, -1.0, math.nan, math.inf, -math.inf, 1e308, 1e-308)
-TEXTS = ("", "\x1b[31m", "../../x", "a" * 5000, "[" * 1000, "{}", "null", "</script>", "3v2")
+TEXTS = (
+    *("", "\x1b[31m", "../../x", "a" * 5000, "[" * 1000, "{}", "null", "</script>", "3v2"),
+    *("a\nb", "\u202e", "$\\x$"),
+)
+NAMES = ("\x1b[31mred", "a\nb", "<script>alert(1)</script>", "\u202e", "", "a b", "~", "a" * 300)
 SHAPES: tuple[Any, ...] = (None, [], {}, 7, "x", [[[]]], {"a": {"b": {"c": []}}}, 1e308, True)
 
 
@@ -106,6 +110,37 @@ def odd_type(messages: list[Said], case: random.Random) -> list[Said]:
     return [m._replace(message_type=name) if m.topic == topic else m for m in messages]
 
 
+def odd_name(messages: list[Said], case: random.Random) -> list[Said]:
+    """A topic, or the namespace of all, has a name that no ROS program would give it."""
+    name = case.choice(NAMES)
+    if case.random() < 0.5:
+        return [m._replace(topic=f"/{name}{m.topic}") for m in messages]
+    topic = case.choice(messages).topic
+    return [m._replace(topic=f"/{name}") if m.topic == topic else m for m in messages]
+
+
+def odd_match(messages: list[Said], case: random.Random) -> list[Said]:
+    """Some messages are of another match; or all are there again, in another match's number."""
+    number, again = case.choice([7, 2**64 - 1]), case.random() < 0.5
+    changed = [_of_match(m, number) for m in messages]
+    if again:
+        return (
+            case.sample(messages + changed, 2 * len(messages))
+            if case.random() < 0.5
+            else (messages + changed)
+        )
+    return [case.choice(pair) for pair in zip(messages, changed, strict=True)]
+
+
+def _of_match(said: Said, number: int) -> Said:
+    """The same message in another match's number, where it has one."""
+    layout = codec(said.message_type)
+    values = layout.decode(said.data)
+    if "match_id" not in values:
+        return said
+    return said._replace(data=layout.encode({**values, "match_id": number}))
+
+
 def odd_order(messages: list[Said], case: random.Random) -> list[Said]:
     """Messages are lost, doubled, or in disorder; times are of the wall, odd, or all alike."""
     kind = case.randrange(5)
@@ -123,7 +158,8 @@ def odd_order(messages: list[Said], case: random.Random) -> list[Said]:
 
 
 CHANGES: tuple[Callable[[list[Said], random.Random], list[Said]], ...] = (
-    odd_value, odd_value, odd_value, odd_json, odd_definition, odd_type, odd_order,
+    odd_value, odd_value, odd_value, odd_json, odd_definition, odd_type, odd_order, odd_name,
+    odd_match,
 )  # fmt: skip
 
 
@@ -184,8 +220,8 @@ def _refusal(tool: Callable[[Path], object], path: Path) -> KeepawayError | None
     try:
         tool(path)
     except KeepawayError as error:
-        if "\n" in str(error):
-            raise RuntimeError("a refusal of several lines") from error
+        if not str(error).isprintable():
+            raise RuntimeError("a refusal that is not one printable line") from error
         return error
     return None
 
@@ -193,6 +229,12 @@ def _refusal(tool: Callable[[Path], object], path: Path) -> KeepawayError | None
 def _page(path: Path) -> None:
     page, _ = replay_page(path)
     assert "NaN" not in page.split('type="application/json">')[1].split("</script>")[0]
+    assert "<script>alert" not in page
+    assert "\x1b" not in page
+
+
+def _report(path: Path) -> None:
+    assert count_gaps(MatchBag(path)).report().isprintable()
 
 
 def _play(path: Path) -> None:
@@ -218,7 +260,7 @@ TOOLS: tuple[Callable[[Path], object], ...] = (
     _play,
     _repair,
     lambda path: check_world(MatchBag(path)),
-    lambda path: count_gaps(MatchBag(path)).report(),
+    _report,
 )
 
 

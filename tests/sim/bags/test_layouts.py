@@ -15,10 +15,13 @@ from recorded import record_match
 from keepaway_sim.analysis.tally import episode_table
 from keepaway_sim.bags import merging
 from keepaway_sim.bags.gaps import count_gaps
+from keepaway_sim.bags.marked import with_markers
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.repair import repair
+from keepaway_sim.bags.verify import check_world
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.view.page import replay_page
 from keepaway_sim.wire.cdr import codec
 
 ODD = 8
@@ -163,6 +166,71 @@ def test_two_matches_of_a_bag_are_two(
     assert [len(rows(whole.path, number)) for number in (1, 2)] == [
         len(expected[MatchBag(path, number).match["seed"]]) for number in (1, 2)
     ]
+
+
+def numbered(messages: Many, match_id: int) -> Many:
+    """The same, as of a match with that number."""
+
+    def one(said: Said) -> Said:
+        if not said.message_type.startswith("keepaway_msgs/"):
+            return said
+        layout = codec(said.message_type)
+        return said._replace(data=layout.encode({**layout.decode(said.data), "match_id": match_id}))
+
+    return [one(said) for said in messages]
+
+
+def in_turn(one: Many, other: Many) -> Many:
+    """As two simulators in one namespace publish at the same time."""
+    return sorted(one + other, key=lambda said: said.time)
+
+
+@pytest.mark.parametrize("task", ["3v2", "4v3"])
+@pytest.mark.parametrize("mixed", [in_turn, lambda a, b: shuffled(a + b)])
+def test_two_matches_at_once_on_the_same_topics_are_told_apart_by_their_numbers(
+    messages: Many, tmp_path: Path, task: str, mixed: Callable[[Many, Many], Many]
+) -> None:
+    second = layouts.read(record_match(tmp_path / "second", task, 3, 2))
+    alone = [numbered(messages, 7), numbered(second, 2**63 + 9)]
+    bags = [write(tmp_path / f"{n}.mcap", said) for n, said in enumerate(alone)]
+    path = write(tmp_path / "bag.mcap", mixed(*alone), chunk_size=20_000)
+    found = {MatchBag(path, n).match["match_id"]: n for n in (1, 2)}
+    for bag, said, number in zip(bags, alone, (found[7], found[2**63 + 9]), strict=True):
+        match = MatchBag(path, number)
+        assert rows(path, number) == rows(bag)
+        assert count_gaps(match).report() == count_gaps(MatchBag(bag)).report()
+        assert replay_page(path, number=number)[0] == replay_page(bag)[0]
+        assert str(check_world(match)) == str(check_world(MatchBag(bag)))
+        own = {m.data for m in said if m.message_type.startswith("keepaway_msgs/")}
+        assert {m.data for m in match.timeline.messages(kept(match))} == own
+        marked = with_markers(path, tmp_path / f"marked_{number}", number)
+        assert {m.data for m in marked.messages(kept(match))} == own
+        assert rows(marked.path) == rows(bag)
+    whole = repair(path, tmp_path / "whole").path
+    assert {MatchBag(whole, n).match["match_id"]: rows(whole, n) for n in (1, 2)} == {
+        7: rows(bags[0]), 2**63 + 9: rows(bags[1])
+    }  # fmt: skip
+
+
+def kept(match: MatchBag) -> set[str]:
+    """The topics of a bag whose messages carry a match's number."""
+    return {t.name for t in match.reader.topics.values() if "keepaway_msgs" in t.message_type}
+
+
+def test_messages_of_a_match_that_nobody_described_are_not_counted_and_are_said(
+    messages: Many, match: Path, tmp_path: Path
+) -> None:
+    stray = [said for said in numbered(messages, 8) if not said.topic.endswith("/match")]
+    path = write(tmp_path / "bag.mcap", in_turn(numbered(messages, 7), stray))
+    assert rows(path) == rows(match)
+    numbers = sum("keepaway_msgs" in said.message_type for said in stray)
+    assert f"{numbers} messages are of a match that the bag does not" in said_of(path)
+    unnumbered = write(tmp_path / "old.mcap", in_turn(numbered(messages, 7), messages[1:]))
+    assert "messages came more than once" in said_of(unnumbered)
+
+
+def said_of(path: Path) -> str:
+    return count_gaps(MatchBag(path)).report()
 
 
 def test_a_match_that_is_told_again_is_one(messages: Many, match: Path, tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
         ("losses", losses_figure(np.array(tally.losses).reshape(-1, 3), task)),
         ("actions", actions_figure(tally.actions, task)),
     ):
-        figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
+        figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4", parse_math=False)
         figure.savefig(output / f"{name}.png", dpi=150, metadata={"Description": made_by})
     return in_words(summary)
 

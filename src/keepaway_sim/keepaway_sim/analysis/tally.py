@@ -101,7 +101,7 @@ class Analyst:
         self._reach = bag.kickable_distance
         self._partial: dict[int, _Partial] = {}
         self._last = (-1, -1)  # episode, and the last keeper in it that had the ball
-        counts = bag.reader.counts
+        counts = bag.found.counts
         keepers = bag.player_topics("action_request")[: task.num_keepers]
         self._knows_requests = all(counts.get(topic) for topic in keepers)
 

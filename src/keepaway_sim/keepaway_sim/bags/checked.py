@@ -23,7 +23,8 @@ _DEEPEST_JSON = 8  # a configuration has 2
 _LONGEST_NAME = 100
 _FARTHEST = 1e4  # [m], [m/s], [rad]; nothing in a match is more
 _MOST = 2**31  # episodes, and cycles of an episode
-_MOST_VALUES = 64  # action values of a request
+MOST_VALUES = 64
+"""Action values of a request."""
 _PLAYER_NAME = re.compile(r"[A-Za-z]\w{0,39}")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 
@@ -101,6 +102,9 @@ def check_match(values: Mapping[str, Any]) -> Task:
     for name, kind in _MATCH_FIELDS.items():
         if not isinstance(values[name], kind):
             raise KeepawayError(f"{name} of its Match is a {type(values[name]).__name__}")
+    for name in ("first_episode", "match_id"):  # newer than the others
+        if not isinstance(values.get(name, 0), int) or not 0 <= values.get(name, 0) < 2**64:
+            raise KeepawayError(f"{name} of its Match is no number from 0 on")
     for name in ("task", "profile", "code_version"):
         if len(values[name]) > _LONGEST_NAME or not values[name].isprintable():
             raise KeepawayError(f"{name}={printable(values[name])}: not a name")
@@ -193,7 +197,7 @@ def check_count(count: int) -> int:
     Raises:
         KeepawayError: more than any learner chooses from.
     """
-    if count > _MOST_VALUES:
+    if count > MOST_VALUES:
         raise KeepawayError(f"a request with {count:,} action values")
     return count
 

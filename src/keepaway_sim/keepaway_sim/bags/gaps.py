@@ -20,6 +20,7 @@ import numpy as np
 from keepaway_sim.bags import checked
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.moments import Moments, joined
+from keepaway_sim.errors import one_line
 from keepaway_sim.task import Outcome
 from keepaway_sim.wire.cdr import codec
 from keepaway_sim.wire.messages import (
@@ -187,14 +188,15 @@ class GapCounter:
         """In words, naming what is missing, and what came again."""
         losses = self._losses()
         if not self.received:
-            return "; ".join(["no perception and no state was recorded", *self.problems])
+            none = "no perception and no state was recorded"
+            return one_line("; ".join([none, *self.problems]))
         parts = losses or [f"nothing is missing of {self.received} perceptions and states"]
         parts += self.problems
         again = self.repeated + sum(count.repeated for count in self.topics.values())
         if again:
             parts = [*parts, f"{again} messages came more than once, and count once"]
         joined_at = self.start() / 1e9
-        report = "; ".join(parts)
+        report = one_line("; ".join(parts))
         return f"joined at {joined_at:.1f} s, since then {report}" if joined_at else report
 
     def _losses(self) -> list[str]:
@@ -258,7 +260,11 @@ def gap_counter(bag: MatchBag) -> GapCounter:
     counter.expect_match(bag.match, bag.namespace)
     counter.tell_ends(bag)
     counter.problems = list(bag.reader.problems)
-    counts = bag.reader.counts
+    if bag.found.strange:
+        counter.problems.append(
+            f"{bag.found.strange} messages are of a match that the bag does not describe"
+        )
+    counts = bag.found.counts
     for seen, asked in zip(*map(bag.player_topics, ("perception", "action_request")), strict=True):
         if not counts.get(seen) and not counts.get(asked):  # nobody knows what was due
             counter.silent.append(asked)

@@ -1,12 +1,14 @@
 """The matches of a bag: which there are, and where the messages of each are.
 
 A match is what one Match message describes. Its messages are known by their topics' namespace
-and, where one topic describes several matches one after the other, by when they came: by their
-log times, or in bags whose log times are simulated (each match begins at 0) by their places.
+and, where one topic describes several matches, by the match's number that they carry. Those
+without a number are told apart by when they came: by their log times, or in bags whose log times
+are simulated (each match begins at 0) by their places.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -14,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.bags import checked, rows
+from keepaway_sim.bags.belonging import Belonging, MatchIds, Span
 from keepaway_sim.bags.blocks import Piece
 from keepaway_sim.bags.reader import BagReader, Place
 from keepaway_sim.errors import KeepawayError
@@ -36,20 +39,6 @@ _KEY_FIELDS = {
 }
 
 
-class Span(NamedTuple):
-    """Which messages belong to a match, of all in its namespace."""
-
-    by_time: bool = True  # by log times [ns]; else by places: number << 32 | row
-    begin: int = -(2**63)
-    end: int = 2**63 - 1
-
-    def chosen(self, number: int, found: np.ndarray) -> np.ndarray:
-        """(n,) bool for the rows of the place with that number."""
-        at = found[:, 1] if self.by_time else (number << 32) + np.arange(len(found))
-        chosen: np.ndarray = (at >= self.begin) & (at < self.end)
-        return chosen
-
-
 @dataclass
 class Found:
     """One match of a bag.
@@ -58,11 +47,14 @@ class Found:
         topic: that describes it.
         values: the Match message's fields.
         task: who plays, on what field.
-        span: which messages of its namespace are its own.
+        belonging: which messages of its namespace are its own.
+        ids: reads the numbers that messages carry; None: the bag's matches have none.
         pieces: where its perceptions, states and requests are, by moments; sources are numbers
             of `BagReader.places`.
         episodes: (n,) its Episode messages, each number once, in order.
         repeated: Match and Episode messages that came again.
+        strange: messages of matches that the bag does not describe, on this one's topics.
+        counts: its perceptions, states and requests by the topics' names.
         simulated: log times are the messages' own stamps.
         last: the newest field state's episode, cycle, outcome and stamp [ns]; None without one.
     """
@@ -70,10 +62,13 @@ class Found:
     topic: str
     values: dict[str, Any]
     task: Task
-    span: Span
+    belonging: Belonging = field(default_factory=Belonging)
+    ids: MatchIds | None = None
     pieces: list[Piece] = field(default_factory=list)
     episodes: list[np.void] = field(default_factory=list)
     repeated: int = 0
+    strange: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
     simulated: bool = True
     last: tuple[int, int, int, int] | None = None
     _ends: dict[int, np.void] = field(default_factory=dict)
@@ -82,6 +77,14 @@ class Found:
     def namespace(self) -> str:
         """What its topics' names begin with."""
         return self.topic.rpartition("/")[0]
+
+    def ids_of(self, data: bytes, rows: np.ndarray) -> np.ndarray:
+        """(n,) uint64 the numbers of the matches that messages are of; 0: not known."""
+        return self.ids.of(data, rows) if self.ids else np.zeros(len(rows), np.uint64)
+
+    def own(self, number: int, data: bytes, rows: np.ndarray) -> np.ndarray:
+        """(n,) bool: which rows of the place with that number are messages of this match."""
+        return self.belonging.chosen(self.ids_of(data, rows), number, rows)
 
 
 class _Description(NamedTuple):
@@ -101,7 +104,7 @@ def find_matches(reader: BagReader) -> list[Found]:
     described, repeated = _descriptions(reader)
     matches: list[Found] = []
     for topic, descriptions in described.items():
-        of_topic = [_found(reader, topic, description) for description in descriptions]
+        of_topic = [_found(topic, description) for description in descriptions]
         _index(reader, of_topic[:1])
         if len(of_topic) > 1:
             _divide(of_topic, descriptions, of_topic[0].simulated)
@@ -154,33 +157,53 @@ def _raw_messages(reader: BagReader, topic: str) -> Iterator[tuple[int, int, byt
             yield (at << 32) | row, time, data[first:last]
 
 
-def _found(reader: BagReader, topic: str, description: _Description) -> Found:
-    return Found(topic, description.values, checked.check_match(description.values), Span())
+def _found(topic: str, description: _Description) -> Found:
+    return Found(topic, description.values, checked.check_match(description.values))
 
 
 def _divide(matches: list[Found], descriptions: list[_Description], simulated: bool) -> None:
-    """Give each match of a topic the messages from its description to the next one's."""
+    """Tell the messages of one topic's matches apart: from its description to the next one's."""
     whole = Span()
     begins = [d.place if simulated else d.time for d in descriptions]
     order = sorted(range(len(begins)), key=begins.__getitem__)
     bounds = [whole.begin, *sorted(begins)[1:], whole.end]
     for rank, number in enumerate(order):
-        matches[number].span = Span(not simulated, bounds[rank], bounds[rank + 1])
-    matches.sort(key=lambda match: match.span.begin)
+        span = Span(not simulated, bounds[rank], bounds[rank + 1])
+        matches[number].belonging = Belonging(span=span)
+    matches.sort(key=lambda match: match.belonging.span.begin)
+
+
+def _number(reader: BagReader, matches: list[Found]) -> None:
+    """Let the messages of one topic's matches be told apart by the matches' numbers."""
+    numbers = [int(match.values.get("match_id", 0)) for match in matches]
+    if not any(numbers):
+        return
+    ids = MatchIds(reader, matches[0].namespace, [match.task for match in matches])
+    for match, number in zip(matches, numbers, strict=True):
+        alone = number if numbers.count(number) == 1 else 0
+        others = tuple(set(numbers) - {number, 0})
+        match.belonging = match.belonging._replace(match_id=alone, others=others)
+        match.ids = ids
 
 
 def _index(reader: BagReader, matches: list[Found]) -> None:
     """Find where the messages of each match are (of one topic's matches, which share a name)."""
+    _number(reader, matches)
     for match in matches:
         match.pieces.clear()
         match._ends.clear()
-        match.repeated, match.simulated, match.last = 0, True, None
-    layouts = _layouts(reader, matches[0])
+        match.counts.clear()
+        match.repeated, match.strange, match.simulated, match.last = 0, 0, True, None
+    layouts = [_layouts(reader, match) for match in matches]
+    known = np.array([0, *(match.values.get("match_id", 0) for match in matches)], np.uint64)
     for at, place in enumerate(reader.places):
         data, found, _ = reader.load(place)
-        for match in matches:
-            own = found[match.span.chosen(at, found)] if len(matches) > 1 else found
-            _index_place(reader, match, layouts, (at, place, data, own))
+        ids = matches[0].ids_of(data, found)
+        strange = int((~np.isin(ids, known)).sum()) if known[1:].all() else 0
+        for match, layout in zip(matches, layouts, strict=True):
+            match.strange += strange
+            own = found[match.belonging.chosen(ids, at, found)]
+            _index_place(reader, match, layout, (at, place, data, own))
     for match in matches:
         match.episodes = [match._ends[number] for number in sorted(match._ends)]
 
@@ -206,6 +229,7 @@ def _index_place(
         except KeepawayError as error:
             name = reader.kinds[number].name
             raise KeepawayError(f"{reader.path}: {name}: {error}") from error
+        match.counts[reader.kinds[number].name] += len(of_topic)
         keys = checked.moment_keys(heads)
         low, high = min(low, int(keys.min())), max(high, int(keys.max()))
         if codec.message_type != ACTION_REQUEST and match.simulated:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from keepaway_sim.bags import checked, rows
+from keepaway_sim.bags.belonging import lengths_of
 from keepaway_sim.bags.blocks import Block
 from keepaway_sim.bags.matches import Found
 from keepaway_sim.bags.reader import BagReader
@@ -58,13 +59,7 @@ class Sorter:
             KeepawayError: one lacks what reading needs.
         """
         self._reader, self._found = reader, found
-        num, objects = found.task.num_players, found.task.num_players + 1
-        places = {"positions": 2 * objects, "velocities": 2 * objects}
-        self._lengths = {
-            FIELD_STATE: {**places, "yaws": num, "neck_yaws": num, "actions": num, "targets": num},
-            PERCEPTION: {**places, "ages": objects, "cycles_to_ball": num},
-            ACTION_REQUEST: {},
-        }
+        self._lengths = lengths_of(found.task)
         self._topics: dict[int, tuple[Codec, int]] = {}  # layout and player by topic's number
         names = {f"{found.namespace}/field_state": (FIELD_STATE, -1)}
         for player, name in enumerate(found.values["player_names"]):
@@ -80,7 +75,7 @@ class Sorter:
     def load(self, number: int) -> Block:
         """The messages of one place, by the moments that they are of."""
         data, found, _ = self._reader.load(self._reader.places[number])
-        found = found[self._found.span.chosen(number, found) & np.isin(found[:, 0], self._known)]
+        found = found[self._found.own(number, data, found) & np.isin(found[:, 0], self._known)]
         keys = np.empty(len(found), dtype=np.int64)
         for topic in np.unique(found[:, 0]).tolist():
             own = found[:, 0] == topic

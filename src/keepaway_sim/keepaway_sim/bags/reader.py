@@ -28,8 +28,8 @@ class Place(NamedTuple):
     run: Run
 
 
-Choice = Callable[[int, np.ndarray], np.ndarray]
-"""Which of a place's rows are wanted: by the place's number and its (n, 4) rows, (n,) bool."""
+Choice = Callable[[int, bytes, np.ndarray], np.ndarray]
+"""Which of a place's rows are wanted, (n,) bool: by its number, its bytes and (n, 4) rows."""
 
 
 class BagReader:
@@ -171,7 +171,7 @@ class BagReader:
             if wanted is not None:
                 own &= np.isin(block.rows[:, 0], wanted)
             if chosen is not None:
-                own &= chosen(number, block.rows)
+                own &= chosen(number, block.data, block.rows)
             return Block(block.data, block.rows[own], block.keys[own])
 
         pieces = [

@@ -44,6 +44,32 @@ def whole(layout: Codec, data: bytes, rows: np.ndarray, lengths: Mapping[str, in
     return taken
 
 
+def laid_out(layout: np.dtype[np.void], data: bytes, rows: np.ndarray) -> np.ndarray:
+    """(n,) bool: which messages are long enough for a layout, and have its sequences' lengths.
+
+    Args:
+        layout: of `Codec.front`.
+        data, rows: of a block.
+    """
+    size = _without_padding(layout).itemsize
+    alike: np.ndarray = rows[:, 3] - rows[:, 2] >= size
+    for name, length in _lengths_in(layout).items():
+        at = np.flatnonzero(alike)
+        alike[at] = field(layout, f"{name}.length", data, rows[at]) == length
+    return alike
+
+
+def field(layout: np.dtype[np.void], name: str, data: bytes, rows: np.ndarray) -> np.ndarray:
+    """(n,) one field of messages that are long enough for the layout."""
+    kind, offset = (layout.fields or {})[name][:2]
+    if not len(rows):
+        return np.zeros(0, kind)
+    raw = np.frombuffer(data, np.uint8)
+    window = np.lib.stride_tricks.sliding_window_view(raw, kind.itemsize)
+    taken: np.ndarray = window[rows[:, 2] + offset].view(kind)[:, 0]
+    return taken
+
+
 def check_fields(layout: Codec, names: tuple[str, ...], lengths: Mapping[str, int]) -> None:
     """Whether a definition in a bag has the fields that reading needs, of the types they have.
 
@@ -78,6 +104,15 @@ def lengths(layout: Codec, data: bytes, rows: np.ndarray, name: str) -> np.ndarr
     """(n,) the lengths of a sequence, the first one in the message."""
     found: np.ndarray = _taken(layout, layout.front({}), data, rows)[f"{name}.length"]
     return found
+
+
+def _lengths_in(layout: np.dtype[np.void]) -> dict[str, int]:
+    """The lengths that a layout gives sequences."""
+    names = [
+        name.removesuffix(".length") for name in layout.names or () if name.endswith(".length")
+    ]
+    sizes = {name: layout[name].shape[0] for name in layout.names or () if layout[name].shape}
+    return {name: sizes.get(name, 0) for name in names}
 
 
 def _without_padding(dtype: np.dtype[np.void]) -> np.dtype[np.void]:

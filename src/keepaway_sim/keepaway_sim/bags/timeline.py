@@ -121,7 +121,7 @@ class Timeline:
             KeepawayError: a damaged chunk, or bytes that are not what their topic carries.
         """
         wanted = self.topics.keys() if topics is None else self.topics.keys() & set(topics)
-        chosen = self.found.span.chosen if self.found and self._shares_topics else None
+        chosen = self.found.own if self.found and self._shares_topics else None
         if self.found is None or self.found.simulated:
             yield from self.reader.messages(wanted, start, end, chosen)
             return

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from keepaway_sim.errors import LOG_PERIOD, KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError, one_line
 from keepaway_sim.match.beginning import begin_match, random_match_id
 from keepaway_sim.match.recorders import RecorderProgress
 from keepaway_sim.match.roster import Roster, checked_status
@@ -192,7 +192,7 @@ class Conductor:
             return
         self._statuses[player] = {**status, "data": data}
         if not was_there:
-            self._log.info(f"{seat.name} is ready: {status['policy']}")
+            self._log.info(f"{seat.name} is ready: {one_line(status['policy'])}")
 
     def take_match(self, data: bytes, sender: bytes) -> None:
         """Take a Match's bytes: an own one, or that of another simulator on the same topics."""
@@ -205,7 +205,7 @@ class Conductor:
             self._publishers_of_match.add(sender)
             if len(self._publishers_of_match) == 1:  # itself
                 return
-        found = f"another simulator publishes `match` here ({other['task']})"
+        found = f"another simulator publishes `match` here ({one_line(other['task'])})"
         has_just_come = self._clock() - self._arrived_at < ARRIVAL and not self._has_begun
         if has_just_come and not self.settings.force:
             self._refusal = f"{found}: choose another namespace or domain, or force:=true"

@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -23,11 +23,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
+from keepaway_sim.bags.checked import check_match
 from keepaway_sim.bags.gaps import GapCounter
 from keepaway_sim.bags.timeline import OwnTimes
 from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.ros.subscribing import listen, offered_qos, take_all, to_profile
@@ -198,7 +199,16 @@ class Recorder(Node):
         self.gaps.feed(topic, message_type, data)
         self.bag.write(topic, message_type, data, self._times.of(message_type, data))
         if message_type == MATCH:
-            self._listen_to_players(codec(MATCH).decode(data)["player_names"])
+            self._learn_players(codec(MATCH).decode(data))
+
+    def _learn_players(self, match: Mapping[str, Any]) -> None:
+        """Listen to the players that a Match names, where it makes sense."""
+        try:
+            check_match(match)
+        except KeepawayError as error:
+            self.get_logger().warning(f"match: {error}", throttle_duration_sec=LOG_PERIOD)
+            return
+        self._listen_to_players(match["player_names"])
 
     def _listen_to_players(self, names: Sequence[str]) -> None:
         for player in names:

@@ -30,10 +30,10 @@ from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.cli.interrupts import SIGNALS, Stopped
-from keepaway_sim.errors import KeepawayError
+from keepaway_sim.errors import KeepawayError, one_line
 from keepaway_sim.ros.parameters import declare_settings
 from keepaway_sim.ros.running import check_arguments
-from keepaway_sim.ros.subscribing import message_class, to_profile
+from keepaway_sim.ros.subscribing import check_topic_name, message_class, to_profile
 from keepaway_sim.settings import setting
 from keepaway_sim.wire.messages import SECOND
 
@@ -175,8 +175,9 @@ class Replayer(Node):
                 difference = difference_from_installed(topic) if topic else ""
                 if topic:
                     message_class(topic.message_type)
+                    check_topic_name(name)
             except KeepawayError as error:
-                self.get_logger().warning(f"{name} is left out: {str(error).splitlines()[0]}")
+                self.get_logger().warning(f"{one_line(name)} is left out: {error}")
                 continue
             if difference and not self.settings.as_recorded:
                 raise KeepawayError(

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from tqdm import tqdm
 
 from keepaway_msgs.msg import Episode, Match
-from keepaway_sim.errors import LOG_PERIOD
+from keepaway_sim.errors import LOG_PERIOD, one_line
 from keepaway_sim.match.scores import Score, summary
 from keepaway_sim.ros.publishing import ALL, MATCHES, QUEUE
 from keepaway_sim.task import Outcome
@@ -127,7 +127,7 @@ class Scoreboard(Node):
         return f"{held}{pace}{self.state}"
 
     def _on_match(self, message: Match) -> None:
-        self._is_own(message.match_id, f"a simulator of {message.task} publishes `match`")
+        self._is_own(message.match_id, f"a simulator of {one_line(message.task)} publishes `match`")
 
     def _on_episode(self, message: Episode) -> None:
         if self._is_own(message.match_id, "`episode` is published"):
@@ -153,6 +153,6 @@ class Scoreboard(Node):
             values = {entry.key: entry.value for entry in status.values}
             name = status.name.removeprefix(prefix)
             if name == "simulator":
-                self.state, self.figures = status.message, values
+                self.state, self.figures = one_line(status.message), values
             else:
                 self.troubles[name] = {key: int(value) for key, value in values.items()}

@@ -4,9 +4,11 @@ import importlib
 from collections.abc import Iterator
 from typing import Any
 
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from keepaway_sim.bags.topics import Qos
 from keepaway_sim.errors import KeepawayError
@@ -25,6 +27,18 @@ def message_class(message_type: str) -> type[Any]:
         return getattr(importlib.import_module(f"{package}.msg"), name)  # type: ignore[no-any-return]
     except (ImportError, AttributeError, ValueError) as error:
         raise KeepawayError(f"{message_type[:100]!r} is not installed: {error}") from error
+
+
+def check_topic_name(name: str) -> None:
+    """Whether ROS takes this for a topic's name.
+
+    Raises:
+        KeepawayError: it does not.
+    """
+    try:
+        validate_full_topic_name(name)
+    except InvalidTopicNameException as error:
+        raise KeepawayError(f"not a topic's name: {error}") from error
 
 
 def listen(node: Node, topic: str, message_type: str, qos: QoSProfile) -> Subscription:
