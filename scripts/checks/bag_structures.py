@@ -1,5 +1,6 @@
 """Bags that are whole MCAP files and odd inside: layouts, JSON shapes, values, lengths, types."""
 
+import contextlib
 import json
 import math
 import random
@@ -54,7 +55,8 @@ def read_all(file: Path) -> list[Said]:
 def changed(messages: list[Said], case: random.Random) -> list[Said]:
     """The messages with one to three odd things among them."""
     for _ in range(case.randint(1, 3)):
-        messages = case.choice(CHANGES)(list(messages), case)
+        with contextlib.suppress(KeepawayError):  # what an earlier change broke is left as it is
+            messages = case.choice(CHANGES)(list(messages), case)
     return messages
 
 
