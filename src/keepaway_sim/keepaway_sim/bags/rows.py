@@ -61,7 +61,8 @@ def laid_out(layout: np.dtype[np.void], data: bytes, rows: np.ndarray) -> np.nda
 
 def field(layout: np.dtype[np.void], name: str, data: bytes, rows: np.ndarray) -> np.ndarray:
     """(n,) one field of messages that are long enough for the layout."""
-    kind, offset = (layout.fields or {})[name][:2]
+    assert layout.fields
+    kind, offset = layout.fields[name][:2]
     if not len(rows):
         return np.zeros(0, kind)
     raw = np.frombuffer(data, np.uint8)
