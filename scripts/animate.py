@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from keepaway_agent.environments.pictures import TRAIL, Painter, moment_of
+from keepaway_agent.environments.pictures import TRAIL, Painter, scene_of
 from keepaway_agent.errors import AgentError
 from keepaway_agent.settings import build
 from keepaway_agent.training.trainer import Trainer
@@ -74,7 +74,7 @@ def played(args: argparse.Namespace) -> Iterator[Image.Image]:
         if world.belief.cycle[field] == 0:
             trail.clear()
         trail.append(world.truth.position[field, -1].copy())
-        drawn = painter.paint(moment_of(world, field, np.array(trail)))
+        drawn = painter.paint(scene_of(world, field, np.array(trail)))
         frames.append(Image.fromarray(drawn).resize((args.side, args.side)))
 
     trial = dataclasses.replace(training.trial(0, weights), watch=watch)

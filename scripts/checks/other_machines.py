@@ -1,25 +1,16 @@
-"""What `robustness.py` makes its rows of: commands, copies of the checkout, libraries that lie."""
+"""What rows of `robustness.py` are made of: commands, their expected ends, copies of the tree."""
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
-
-import numpy as np
-
-from keepaway_agent.actions import Role
-from keepaway_agent.learning.cmac import make_tiling
-from keepaway_agent.learning.weights import LearnedWeights, write_weights
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "src/keepaway_sim/docs/robustness.md"
@@ -72,48 +63,6 @@ def with_table(text: str) -> str:
     return before + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + after
 
 
-NO_LINKS = """
-#include <errno.h>
-int link(const char *a, const char *b) { errno = EPERM; return -1; }
-int linkat(int a, const char *b, int c, const char *d, int e) { errno = EPERM; return -1; }
-"""
-
-CLOCK = """
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <stdlib.h>
-#include <sys/time.h>
-#include <time.h>
-#include <unistd.h>
-static long shift(void) {  /* an hour back, once the file CLOCK_BACK_WHEN is there */
-    static int seen;
-    const char *file = getenv("CLOCK_BACK_WHEN");
-    if (!seen && file) seen = access(file, F_OK) == 0;
-    return seen ? -3600 : 0;
-}
-int clock_gettime(clockid_t id, struct timespec *t) {
-    static int (*real)(clockid_t, struct timespec *);
-    if (!real) real = dlsym(RTLD_NEXT, "clock_gettime");
-    int result = real(id, t);
-    if (id == CLOCK_REALTIME || id == CLOCK_REALTIME_COARSE) t->tv_sec += shift();
-    return result;
-}
-int gettimeofday(struct timeval *restrict t, void *restrict zone) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    t->tv_sec = now.tv_sec;
-    t->tv_usec = now.tv_nsec / 1000;
-    return 0;
-}
-time_t time(time_t *out) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    if (out) *out = now.tv_sec;
-    return now.tv_sec;
-}
-"""
-
-
 def shared_library(folder: Path, source: str) -> str:
     """A library that stands before the C library (LD_PRELOAD)."""
     text, made = folder / "preload.c", folder / "preload.so"
@@ -121,44 +70,6 @@ def shared_library(folder: Path, source: str) -> str:
     compiler = ["cc", "-shared", "-fPIC", "-O1", "-o", str(made), str(text), "-ldl"]
     subprocess.run(compiler, check=True)
     return str(made)
-
-
-def bombs() -> list[tuple[str, bytes]]:
-    """Weights files that are not what they say."""
-    members = whole_members()
-    metadata = json.loads(members["metadata.json"])
-    changes: list[dict[str, object]] = [
-        {"num_keepers": 10**9},
-        {"player": "\x1b]0;owned\x07keeper_1"},
-        {"created_by": "\x1b[2J"},
-        {"seed": 10**4000},
-    ]
-    texts = [json.dumps(metadata | each, allow_nan=False).encode() for each in changes]
-    files = [packed({**members, "metadata.json": text}) for text in texts]
-    for name in members:
-        unpacked = {**members, name: bytes(2**28)}
-        files += [packed(unpacked), packed(unpacked, {name: 1000})]
-    return [(f"bomb_{number}.npz", data) for number, data in enumerate(files)]
-
-
-def whole_members() -> dict[str, bytes]:
-    """The members of a weights file as it should be."""
-    tiling, file = make_tiling(Role.KEEPER, 2, 1), io.BytesIO()
-    values = np.zeros(tiling.weights_shape(2))
-    write_weights(file, LearnedWeights(values, Role.KEEPER, 2, 1, 25.0, 25.0, tiling))
-    with zipfile.ZipFile(file) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
-def packed(members: dict[str, bytes], says: dict[str, int] | None = None) -> bytes:
-    """An archive, that may say of a member that it unpacks to other than it does."""
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-        for name, size in (says or {}).items():
-            archive.getinfo(name).file_size = size
-    return file.getvalue()
 
 
 def script(name: str, *arguments: object) -> list[str]:
@@ -199,6 +110,36 @@ def expect_one_line(done: subprocess.CompletedProcess[str], words: str) -> None:
     (line,) = done.stderr.splitlines() or [""]
     assert words in line, done.stderr
     assert line.isprintable(), ascii(line)
+
+
+def expect_stopped(
+    command: Sequence[str], number: int, times: int = 1, *, after: float | None = None
+) -> list[str]:
+    """Send a signal to a command that runs, and expect the exit code of that signal.
+
+    Args:
+        command: that is started.
+        number: of the signal.
+        times: that it is sent, 50 ms apart.
+        after: the start [s]; None waits for the first line that it prints.
+
+    Returns:
+        the lines of its standard error.
+    """
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, env=environment()) as started:
+        assert started.stdout
+        if after is None:
+            started.stdout.readline()
+        else:
+            time.sleep(after)
+        for _ in range(times):
+            started.send_signal(number)
+            time.sleep(0.05)
+        _, errors = started.communicate(timeout=60)
+    # Python's own handlers end the process by the signal itself: to a shell the same codes.
+    assert started.returncode in (128 + number, -number), (started.returncode, errors)
+    return errors.decode().splitlines()
 
 
 def run_tests(*arguments: str) -> None:

@@ -1,10 +1,15 @@
 """What the world's and the agents' packages both have, because neither imports the other."""
 
+import inspect
+from enum import EnumType
 from pathlib import Path
+from types import ModuleType
 
+import house
 import pytest
 
 from keepaway_agent import actions
+from keepaway_agent import errors as agent_errors
 from keepaway_agent.checks import conformance
 from keepaway_agent.learning import weights
 from keepaway_agent.nodes import conversions, player, scripted_simulator
@@ -33,19 +38,36 @@ def test_twins_differ_in_the_name_of_their_package_alone(ours: str, theirs: str)
     assert sim == agent
 
 
-@pytest.mark.parametrize(
-    ("ours", "theirs"),
-    [
-        (config.NEVER, actions.NEVER),
-        (config.CYCLE_TIME, conformance.CYCLE_TIME),
-        (cdr.HEADER, conversions.HEADER),
-        (errors.LOG_PERIOD, player.LOG_PERIOD),
-        (conductor.RESEND_PERIOD, scripted_simulator.RESEND_PERIOD),
-        (task.MAX_TEAM_SIZE, weights.MAX_TEAM_SIZE),
-        (task.MAX_FIELD_SIDE, weights.MAX_FIELD_SIDE),
-        *((dict(getattr(task, n).__members__), dict(getattr(actions, n).__members__))
-          for n in ("Action", "Role", "Outcome")),
-    ],
-)  # fmt: skip
-def test_what_agents_say_again_has_the_same_values(ours: object, theirs: object) -> None:
-    assert ours == theirs
+AGAIN = {
+    "Action": (task, actions),
+    "Role": (task, actions),
+    "Outcome": (task, actions),
+    "NEVER": (config, actions),
+    "HEADER": (cdr, conversions),
+    "CYCLE_TIME": (config, conformance),
+    "LOG_PERIOD": (errors, player),
+    "RESEND_PERIOD": (conductor, scripted_simulator),
+    "MAX_FIELD_SIDE": (task, weights),
+    "MAX_TEAM_SIZE": (task, weights),
+    "SettingError": (errors, agent_errors),
+    "Spin": (conductor, scripted_simulator),
+}
+"""What agents define again, and where."""
+
+
+def value_of(module: ModuleType, name: str) -> object:
+    """A constant; the members of an enumeration; the sentence of an error."""
+    value = getattr(module, name)
+    if isinstance(value, EnumType):
+        return dict(value.__members__)
+    return inspect.getdoc(value) if isinstance(value, type) else value
+
+
+@pytest.mark.parametrize("name", AGAIN)
+def test_what_agents_define_again_has_the_same_value(name: str) -> None:
+    ours, theirs = AGAIN[name]
+    assert value_of(ours, name) == value_of(theirs, name)
+
+
+def test_every_name_that_may_be_defined_again_is_compared() -> None:
+    assert set(AGAIN) == house.TWIN_NAMES

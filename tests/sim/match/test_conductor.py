@@ -9,7 +9,8 @@ import pytest
 
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.beginning import begin_match
-from keepaway_sim.match.conductor import LONG_WAIT, Conductor
+from keepaway_sim.match.conductor import Conductor
+from keepaway_sim.match.reporting import LONG_WAIT
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.wire import messages

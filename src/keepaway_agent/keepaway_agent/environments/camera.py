@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from keepaway_agent.environments.fields import DecisionFields
-from keepaway_agent.environments.pictures import TRAIL, Moment, Painter, moment_of
+from keepaway_agent.environments.pictures import TRAIL, Painter, Scene, scene_of
 from keepaway_agent.environments.refusals import UnsupportedModeError
 
 FRAMES_PER_SECOND: Final = 10
@@ -24,7 +24,7 @@ class Camera:
         """Prepare; frames are drawn on request."""
         self._fields, self._mode = fields, render_mode
         self._balls: deque[np.ndarray] = deque(maxlen=TRAIL + 1)  # (num_fields, 2) [m]
-        self._film: deque[Moment] = deque(maxlen=MAX_KEPT)
+        self._film: deque[Scene] = deque(maxlen=MAX_KEPT)
         self._painter: Painter | None = None
         self._window: Any = None
         if render_mode is not None:
@@ -34,7 +34,7 @@ class Camera:
         """Take note of a cycle that was played."""
         self._balls.append(fields.world.truth.position[:, -1].copy())
         if self._mode == "rgb_array_list":
-            self._film.append(self._moment(0))
+            self._film.append(self._scene(0))
         elif self._mode == "human":
             self._show(self.frame(0))
 
@@ -44,12 +44,12 @@ class Camera:
             return self.frame(0)
         if self._mode == "rgb_array_list":
             film, self._film = list(self._film), deque(maxlen=MAX_KEPT)
-            return [self._paint(moment) for moment in film]
+            return [self._paint(scene) for scene in film]
         return None
 
     def frame(self, field: int) -> np.ndarray:
         """(height, width, 3) uint8, a field as it is now."""
-        return self._paint(self._moment(field))
+        return self._paint(self._scene(field))
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -63,15 +63,15 @@ class Camera:
         """Copies and pickles have no window; they open one of their own."""
         return self.__dict__ | {"_window": None, "_painter": None}
 
-    def _moment(self, field: int) -> Moment:
+    def _scene(self, field: int) -> Scene:
         cycle = int(self._fields.cycle[field])
         trail = [balls[field] for balls in self._balls][-cycle - 1 :]
-        return moment_of(self._fields.world, field, np.array(trail).reshape(-1, 2))
+        return scene_of(self._fields.world, field, np.array(trail).reshape(-1, 2))
 
-    def _paint(self, moment: Moment) -> np.ndarray:
+    def _paint(self, scene: Scene) -> np.ndarray:
         if self._painter is None:
             self._painter = Painter(self._fields.task)
-        return self._painter.paint(moment)
+        return self._painter.paint(scene)
 
     def _show(self, frame: np.ndarray) -> None:
         """Put a frame into the window, and wait until its time has come."""

@@ -41,9 +41,9 @@ OUTSIDE: Final = "outside"
 """The policy of a team whose choices are made from outside."""
 RULES: Final = ("random", "hold", "hand")
 """Policies of a team that plays by itself; takers cannot hold."""
-PATIENCE: Final = 100_000
+LONGEST_WAIT: Final = 100_000
 """Cycles without a choice after which a world is given up."""
-_STUCK: Final = f"no player has had a choice for {PATIENCE} cycles: check config"
+_STUCK: Final = f"no player has had a choice for {LONGEST_WAIT} cycles: check config"
 _STAND_INS: Final = {Role.KEEPER: "hold", Role.TAKER: "random"}
 """What asks for a choice where a learner would; the choice from outside replaces its own."""
 
@@ -249,8 +249,8 @@ class DecisionFields:
             AgentError: no player gets a choice; with these constants no match can be played.
         """
         plays = self._plays(moved, in_play, cycles)
-        most = 1 if self.watchers else PATIENCE
-        rounds = PATIENCE // most
+        most = 1 if self.watchers else LONGEST_WAIT
+        rounds = LONGEST_WAIT // most
         while plays.moving.any():
             if rounds == 0:
                 raise AgentError(_STUCK)
@@ -263,7 +263,7 @@ class DecisionFields:
         Arguments and errors are those of `play_on`.
         """
         plays = self._plays(self._everywhere, in_play, cycles)
-        for _ in range(PATIENCE):
+        for _ in range(LONGEST_WAIT):
             if self._advance(plays, 1):
                 return
             plays.moving.fill(True)

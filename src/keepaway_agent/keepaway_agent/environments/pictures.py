@@ -26,7 +26,7 @@ _FINE: Final = 2
 _STRIPES: Final = 5
 
 
-class Moment(NamedTuple):
+class Scene(NamedTuple):
     """What of a field is drawn."""
 
     position: np.ndarray  # (num_players + 1, 2) [m], the ball last
@@ -39,10 +39,10 @@ class Moment(NamedTuple):
     outcome: int
 
 
-def moment_of(world: World, field: int, trail: np.ndarray) -> Moment:
+def scene_of(world: World, field: int, trail: np.ndarray) -> Scene:
     """The present of a field of a World, copied; `trail` is (num_points, 2)."""
     truth, seen = world.truth, world.belief
-    return Moment(
+    return Scene(
         truth.position[field].copy(),
         truth.yaw[field].copy(),
         truth.yaw[field] + seen.neck[field],
@@ -55,7 +55,7 @@ def moment_of(world: World, field: int, trail: np.ndarray) -> Moment:
 
 
 class Painter:
-    """Draws moments of one task.
+    """Draws scenes of one task.
 
     Attributes:
         size: (width, height) of a frame in pixels.
@@ -72,17 +72,17 @@ class Painter:
         self._font = ImageFont.load_default(1.25 * self._radius)
         self._ground = self._draw_ground()
 
-    def paint(self, moment: Moment) -> np.ndarray:
+    def paint(self, scene: Scene) -> np.ndarray:
         """A frame, (height, width, 3) uint8."""
         image = self._ground.copy()
         pen = ImageDraw.Draw(image, "RGBA")
         for player in range(self._task.num_players):
-            self._draw_intent(pen, moment, player)
-        self._draw_trail(pen, moment)
+            self._draw_intent(pen, scene, player)
+        self._draw_trail(pen, scene)
         for player in range(self._task.num_players):
-            self._draw_player(pen, moment, player)
-        self._disc(pen, moment.position[-1], max(0.16 * self._scale, 0.55 * self._radius), BALL)
-        self._write(pen, (image.width / 2, 0.6 * self._radius), _caption(moment))
+            self._draw_player(pen, scene, player)
+        self._disc(pen, scene.position[-1], max(0.16 * self._scale, 0.55 * self._radius), BALL)
+        self._write(pen, (image.width / 2, 0.6 * self._radius), _caption(scene))
         return np.asarray(image.reduce(_FINE))
 
     def _place(self, point: np.ndarray) -> tuple[float, float]:
@@ -108,11 +108,11 @@ class Painter:
         )
         return image
 
-    def _draw_intent(self, pen: ImageDraw.ImageDraw, moment: Moment, player: int) -> None:
-        action = moment.action[player]
+    def _draw_intent(self, pen: ImageDraw.ImageDraw, scene: Scene, player: int) -> None:
+        action = scene.action[player]
         if action not in (Action.PASS_BALL, Action.MARK_KEEPER):
             return
-        start, end = moment.position[player], moment.position[moment.target[player]]
+        start, end = scene.position[player], scene.position[scene.target[player]]
         length = math.dist(start, end)
         dash, gap = (0.5, 0.3) if action == Action.PASS_BALL else (0.12, 0.25)
         for at in np.arange(0.0, length, dash + gap):
@@ -120,8 +120,8 @@ class Painter:
             points = [self._place(start + share * (end - start)) for share in ends]
             pen.line(points, fill=self._colour(player), width=round(0.1 * self._scale))
 
-    def _draw_trail(self, pen: ImageDraw.ImageDraw, moment: Moment) -> None:
-        points = [self._place(point) for point in moment.trail]
+    def _draw_trail(self, pen: ImageDraw.ImageDraw, scene: Scene) -> None:
+        points = [self._place(point) for point in scene.trail]
         for age in range(1, len(points)):
             alpha = round(255 * 0.75 * (1 - age / (TRAIL + 1)))
             pen.line(
@@ -130,11 +130,11 @@ class Painter:
                 width=round(0.14 * self._scale),
             )
 
-    def _draw_player(self, pen: ImageDraw.ImageDraw, moment: Moment, player: int) -> None:
-        at, radius = moment.position[player], self._radius
-        self._spoke(pen, at, moment.face[player], (0.0, 1.75), self._colour(player))
+    def _draw_player(self, pen: ImageDraw.ImageDraw, scene: Scene, player: int) -> None:
+        at, radius = scene.position[player], self._radius
+        self._spoke(pen, at, scene.face[player], (0.0, 1.75), self._colour(player))
         self._disc(pen, at, radius, self._colour(player))
-        self._spoke(pen, at, moment.body[player], (0.35, 0.95), INK)
+        self._spoke(pen, at, scene.body[player], (0.35, 0.95), INK)
         x, y = self._place(at)
         team, number = self._task.player_names[player].split("_")
         self._write(pen, (x, y + 1.2 * radius), f"{team[0].upper()}{number}")
@@ -164,8 +164,8 @@ class Painter:
         return TEAM_COLOURS[self._task.role(player)]
 
 
-def _caption(moment: Moment) -> str:
-    seconds = f"{moment.cycle / 10:.1f} s"
-    if moment.outcome == Outcome.IN_PLAY:
+def _caption(scene: Scene) -> str:
+    seconds = f"{scene.cycle / 10:.1f} s"
+    if scene.outcome == Outcome.IN_PLAY:
         return seconds
-    return f"{seconds}, {Outcome(moment.outcome).name.lower().replace('_', ' ')}"
+    return f"{seconds}, {Outcome(scene.outcome).name.lower().replace('_', ' ')}"

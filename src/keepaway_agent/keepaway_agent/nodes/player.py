@@ -271,13 +271,13 @@ def main(role: Role, args: list[str] | None = None) -> None:
     run_node(role.name.lower(), partial(_play, role), settings, AgentError, args)
 
 
-def _play(role: Role, is_told_to_end: Callable[[], bool]) -> None:
+def _play(role: Role, must_end: Callable[[], bool]) -> None:
     player = PlayerNode(role)
     executor = EventsExecutor()  # the quick one
     executor.add_node(player)
     gc.freeze()  # nor what has been compiled
     try:
-        while not is_told_to_end():
+        while not must_end():
             executor.spin_once(timeout_sec=PATIENCE)
     finally:  # a match in which it cannot play is no reason to forget what it knows
         player.save()

@@ -12,9 +12,10 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from keepaway_sim.errors import LOG_PERIOD, KeepawayError, one_line
+from keepaway_sim.errors import KeepawayError, one_line
 from keepaway_sim.match.beginning import begin_match, random_match_id
 from keepaway_sim.match.recorders import RecorderProgress
+from keepaway_sim.match.reporting import Log, Reporter
 from keepaway_sim.match.roster import Roster, checked_status
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Outcome
@@ -26,7 +27,6 @@ from keepaway_sim.world.world import World
 
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
-LONG_WAIT = 60.0  # [s] a wait for players is a warning only then
 ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another one refuses to play
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 
@@ -57,19 +57,6 @@ class Outlet(Protocol):
 
     def write_recorded(self) -> None:
         """Write into the bag what was recorded since the last time."""
-
-
-class Log(Protocol):
-    """What a match reports in words: a ROS logger, or one of Python's."""
-
-    def info(self, message: str) -> Any:
-        """What a person may want to know."""
-
-    def warning(self, message: str) -> Any:
-        """What went wrong without harm."""
-
-    def error(self, message: str) -> Any:
-        """What went wrong."""
 
 
 class Conductor:
@@ -115,7 +102,8 @@ class Conductor:
         self.count_recorders: Callable[[], int] = lambda: 0
         self.on_begin: Callable[[], None] = lambda: None
         self.on_end: Callable[[], None] = lambda: None
-        self._outlet, self._log, self._clock = outlet, log, clock
+        self._outlet, self._clock = outlet, clock
+        self._report = Reporter(log, clock)
         self._messages = FieldMessages(world, match_id=self.match_id)
         self._is_reset = self._has_begun = False
         self._arrived_at, self._refusal = clock(), ""
@@ -123,7 +111,6 @@ class Conductor:
         self._statuses: dict[int, dict[str, Any]] = {}
         self._first_counts: dict[int, int] = {}
         self._perceptions: list[bytes] = []
-        self._reported_at: dict[str, float] = {}  # [s] by what was reported
         self._due = self._remind_at = self._markers_at = 0.0  # [s] of the monotonic clock
 
     @property
@@ -136,13 +123,13 @@ class Conductor:
         played = self.settings.seed, self.settings.speed, self.settings.first_episode
         self._outlet.publish("match", self._messages.match(*played), 0)
 
-    def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
-        """Play until all episodes have ended, or `is_told_to_end` is true.
+    def play(self, spin: Spin, must_end: Callable[[], bool] = lambda: False) -> None:
+        """Play until all episodes have ended, or `must_end` is true.
 
         Raises:
             KeepawayError: another simulator was there before.
         """
-        self._is_told_to_end, self._spin = is_told_to_end, spin
+        self._must_end, self._spin = must_end, spin
         while not self._is_over():
             if not self._can_play():
                 spin(RESEND_PERIOD)
@@ -192,14 +179,14 @@ class Conductor:
             return
         self._statuses[player] = {**status, "data": data}
         if not was_there:
-            self._log.info(f"{seat.name} is ready: {one_line(status['policy'])}")
+            self._report.info(f"{seat.name} is ready: {one_line(status['policy'])}")
 
     def take_match(self, data: bytes, sender: bytes) -> None:
         """Take a Match's bytes: an own one, or that of another simulator on the same topics."""
         try:
             other = codec(messages.MATCH).decode(data)
         except KeepawayError as error:
-            self._warn("match", f"match: ignored: {error}")
+            self._report.warn("match", f"match: ignored: {error}")
             return
         if other["match_id"] == self.match_id:
             self._publishers_of_match.add(sender)
@@ -210,14 +197,16 @@ class Conductor:
         if has_just_come and not self.settings.force:
             self._refusal = f"{found}: choose another namespace or domain, or force:=true"
         else:
-            self._warn("match", f"{found}: players and scoreboards tell them apart by match_id")
+            self._report.warn(
+                "match", f"{found}: match_id identifies them to players and scoreboards"
+            )
 
     def take_recorded(self, data: bytes, sender: bytes) -> None:
         """Take the bytes of the time that a recorder has reached."""
         try:
             self.recorders.take(data, sender)
         except struct.error as error:
-            self._warn("recorded", f"recorded: ignored: {error}")
+            self._report.warn("recorded", f"recorded: ignored: {error}")
 
     def start(self) -> str:
         """Start or resume; what it does then, in words."""
@@ -253,7 +242,7 @@ class Conductor:
     # Whether to play.
 
     def _is_over(self) -> bool:
-        return self._is_played() or self._is_told_to_end() or bool(self._refusal)
+        return self._is_played() or self._must_end() or bool(self._refusal)
 
     def _is_played(self) -> bool:
         """Have all episodes ended?"""
@@ -265,7 +254,7 @@ class Conductor:
             return False
         missing = self.missing()
         if missing:
-            self._report_waiting(f"waits for {missing}")
+            self._report.waiting(f"waits for {missing}")
         elif not self._has_begun:
             self._begin()
         return not missing
@@ -282,7 +271,7 @@ class Conductor:
         while self.recorders.is_behind(self._messages.stamp_ns()) and not self._is_over():
             self._spin(RESEND_PERIOD)
             if self._clock() > until:
-                self._log.error("a recorder timed out: the match continues without it")
+                self._report.error("a recorder timed out: the match continues without it")
                 self.recorders.time_out(self._messages.stamp_ns())
 
     # A cycle.
@@ -291,7 +280,7 @@ class Conductor:
         """Publish this moment: first to the players, who then decide meanwhile."""
         now, stamp = self._clock(), self._messages.stamp_ns()
         for name in self.roster.begin(self.world, now):
-            self._log.info(f"{name} is back")
+            self._report.info(f"{name} is back")
         self._perceptions = self._messages.perceptions()
         for seat, data in zip(self.roster.seats, self._perceptions, strict=True):
             self._outlet.publish(f"{seat.name}/perception", data, stamp)
@@ -330,7 +319,7 @@ class Conductor:
         return self._due
 
     def _is_collecting(self, until: float) -> bool:
-        if self._is_reset or self._is_told_to_end():
+        if self._is_reset or self._must_end():
             return False
         if until < math.inf:
             return self._clock() < until
@@ -341,7 +330,7 @@ class Conductor:
         self._remind_at = now + RESEND_PERIOD
         timeout, seen = self.settings.answer_timeout, self.world.belief
         for name in self.roster.time_out(now, timeout):
-            self._log.error(
+            self._report.error(
                 f"{name} timed out: no answer for {timeout} s, episode {seen.episode[0]} cycle"
                 f" {seen.cycle[0]}; it does the default until it comes back"
             )
@@ -351,7 +340,7 @@ class Conductor:
 
     def _step(self) -> None:
         """Play the cycle; where a reset was asked for, the episode ends with it."""
-        if self._is_told_to_end():
+        if self._must_end():
             return
         stamp, seen = self._messages.stamp_ns(), self.world.belief
         for name, data in self.roster.answers():
@@ -383,29 +372,6 @@ class Conductor:
 
     def _warn_rejected(self, player: int, error: KeepawayError) -> None:
         seen, name = self.world.belief, self.roster.seats[player].name
-        self._warn(
+        self._report.warn(
             name, f"{name}, episode {seen.episode[0]} cycle {seen.cycle[0]}: rejected: {error}"
         )
-
-    def _warn(self, subject: str, text: str) -> None:
-        """Warn, of one subject at most every `LOG_PERIOD`."""
-        if self._is_due(subject, LOG_PERIOD):
-            self._log.warning(text)
-
-    def _report_waiting(self, text: str) -> None:
-        """Report it every `LOG_PERIOD`, not at once; it is a warning only after `LONG_WAIT`."""
-        now = self._clock()
-        for subject in ("waiting", "waiting long"):
-            self._reported_at.setdefault(subject, now)
-        if self._is_due("waiting long", LONG_WAIT):
-            self._log.warning(text)
-        elif self._is_due("waiting", LOG_PERIOD):
-            self._log.info(text)
-
-    def _is_due(self, subject: str, period: float) -> bool:
-        """Whether a subject was last reported that long ago [s]; if so, it is reported now."""
-        now = self._clock()
-        is_due = now - self._reported_at.get(subject, -math.inf) >= period
-        if is_due:
-            self._reported_at[subject] = now
-        return is_due

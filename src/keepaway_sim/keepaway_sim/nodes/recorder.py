@@ -53,14 +53,14 @@ FLUSH_PERIOD = 1.0  # [s]
 QUIET = 0.3  # [s] nothing came for this long: all that was published has come
 LONGEST_LAST_WAIT = 5.0  # [s] a match that continues is left after this time
 REPORT_STEP = 10 * CYCLE_NS  # a simulator that waits for it lets it be further behind than that
-SAID_BY_THE_MATCH = {
+MATCH_TOPICS = {
     "/clock": CLOCK,
     "match": MATCH,
     "field_state": FIELD_STATE,
     "episode": EPISODE,
     "markers": MARKERS,
 }
-SAID_BY_PLAYERS = {
+PLAYER_TOPICS = {
     "perception": PERCEPTION,
     "action_request": ACTION_REQUEST,
     "status": AGENT_STATUS,
@@ -92,7 +92,7 @@ class RecorderSettings:
         for topic, _, message_type in entries:
             if message_type.count("/") != 2:
                 raise KeepawayError(f"more_topics: {topic} needs a type, =package/msg/Name")
-        return SAID_BY_THE_MATCH | {topic: message_type for topic, _, message_type in entries}
+        return MATCH_TOPICS | {topic: message_type for topic, _, message_type in entries}
 
 
 class Recorder(Node):
@@ -212,7 +212,7 @@ class Recorder(Node):
 
     def _listen_to_players(self, names: Sequence[str]) -> None:
         for player in names:
-            for name, message_type in SAID_BY_PLAYERS.items():
+            for name, message_type in PLAYER_TOPICS.items():
                 self._listen(f"{player}/{name}", message_type)
             self.gaps.expect(self.resolve_topic_name(f"{player}/perception"))
         self.gaps.expect(self.resolve_topic_name("field_state"))

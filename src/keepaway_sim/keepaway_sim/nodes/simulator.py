@@ -80,9 +80,9 @@ class Simulator(Node):
         self._offer()
         self.conductor.announce()
 
-    def play(self, spin: Spin, is_told_to_end: Callable[[], bool] = lambda: False) -> None:
+    def play(self, spin: Spin, must_end: Callable[[], bool] = lambda: False) -> None:
         """Play until all episodes have ended, or a signal comes, or ROS is shut down."""
-        self.conductor.play(spin, lambda: is_told_to_end() or not self.context.ok())
+        self.conductor.play(spin, lambda: must_end() or not self.context.ok())
         if self.context.ok():
             self.conductor.take_leave()
 
@@ -215,13 +215,13 @@ def main(args: list[str] | None = None) -> None:
     run_node("simulator", _play, (MatchSettings, Config), KeepawayError, args)
 
 
-def _play(is_told_to_end: Callable[[], bool]) -> None:
+def _play(must_end: Callable[[], bool]) -> None:
     simulator = Simulator()
     executor = EventsExecutor()  # the quick one
     executor.add_node(simulator)
     gc.freeze()  # nor what has been compiled
     try:
-        simulator.play(lambda timeout: executor.spin_once(timeout), is_told_to_end)
+        simulator.play(lambda timeout: executor.spin_once(timeout), must_end)
     finally:
         simulator.close()
 

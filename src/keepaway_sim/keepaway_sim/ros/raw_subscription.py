@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -101,14 +100,9 @@ class RawSubscription(Waitable):
         """The executor begins to use it."""
         self._subscription.__enter__()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """The executor no longer uses it."""
-        self._subscription.__exit__(kind, error, trace)
+        self._subscription.__exit__(*error)
 
     def get_num_entities(self) -> NumberOfEntities:
         """What it puts into a wait set."""

@@ -110,20 +110,6 @@ def read_time(data: bytes) -> int:
     return int(sec) * SECOND + int(nanosec)
 
 
-def clean_request(data: bytes) -> bytes:
-    """An ActionRequest's bytes with its padding zeroed.
-
-    ROS's serialiser leaves whatever was in memory between the fields; without it, two matches
-    that are equal are recorded with equal bytes.
-    """
-    clean = bytearray(data)
-    clean[5:8] = bytes(3)  # after player_index
-    clean[18:20] = bytes(2)  # after target
-    if len(clean) > 24:
-        clean[24:28] = bytes(4)  # before the action values and the match's number
-    return bytes(clean)
-
-
 def action_request(request: Request, action_values: Sequence[float] = ()) -> bytes:
     """An ActionRequest; `action_values` is what a learner expected of each choice [cycles].
 

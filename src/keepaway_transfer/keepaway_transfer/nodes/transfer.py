@@ -95,10 +95,10 @@ def main(args: list[str] | None = None) -> None:
     run_node("transfer", _serve, (TransferSettings,), KeepawayError, args)
 
 
-def _serve(is_told_to_end: Callable[[], bool]) -> None:
+def _serve(must_end: Callable[[], bool]) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(TransferNode())
-    while not is_told_to_end():
+    while not must_end():
         executor.spin_once(timeout_sec=SPIN_TIMEOUT)
 
 

@@ -10,7 +10,6 @@ import traceback
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from keepaway_agent.training.processes import Worker, how_it_ended
@@ -83,12 +82,7 @@ class WorkerExecutor(Executor):
                 worker.kill()
         self.shutdown(cancel_futures=True)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         self.shutdown() if kind is None else self.kill()
 
     def _cancel_waiting(self) -> None:
