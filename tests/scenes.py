@@ -15,7 +15,7 @@ from keepaway_sim.world.bodies import Bodies
 from keepaway_sim.world.config import NEVER, Config, noiseless, profile
 from keepaway_sim.world.constants import pack
 from keepaway_sim.world.skills import kicking, tactics
-from keepaway_sim.world.skills.prediction import ball_of, body_of, reach_ball
+from keepaway_sim.world.skills.prediction import ball_of, body_of, reach_ball, straight_run
 from keepaway_sim.world.state import Command, Fields, make_fields
 from keepaway_sim.world.streams import Draws
 
@@ -116,7 +116,9 @@ class Scene:
             if self.belief.age[0, p, j] < NEVER:
                 limit = 2 * self.c.intercept_horizon - 1
                 body, ball = body_of(self.w, 0, p, j), ball_of(self.w, 0, p)
-                self.belief.cycles_to_ball[0, p, j] = reach_ball(self.c, body, 0, ball, limit)[1]
+                start = straight_run(self.c, body, 0, ball, limit)
+                found = reach_ball(self.c, body, 0, ball, start, limit)
+                self.belief.cycles_to_ball[0, p, j] = found[1]
 
     def command(self, name: str, action: int, target: str = "1") -> tuple[float, float, float]:
         """A player's command: kind, power, angle [deg]."""

@@ -108,10 +108,15 @@ def test_way_left_after_running_straight(cycles, left):
     assert prediction.reach_after(C, AT_REST, 10.0, 0.0, cycles) == approx(left)
 
 
+def reach_ball(body, lead, ball, limit=LIMIT):
+    start = prediction.straight_run(C, body, lead, ball, limit)
+    return prediction.reach_ball(C, body, lead, ball, start, limit)
+
+
 def to_ball(x, y, ball, ball_v):
     body = Body(float(x), float(y), 0.0, 0.0, 1.0, 0.0)
     rolling = Ball(*(float(value) for value in (*ball, *ball_v)))
-    return prediction.reach_ball(C, body, 0, rolling, LIMIT)[1]
+    return reach_ball(body, 0, rolling)[1]
 
 
 def test_a_ball_that_comes_is_reached_sooner():
@@ -151,9 +156,9 @@ def test_skipping_cycles_finds_the_first_in_which_the_ball_is_reached(lead):
             if needed <= i:
                 expected = i, needed
                 break
-        assert prediction.reach_ball(C, body, lead, ball, LIMIT) == expected
+        assert reach_ball(body, lead, ball) == expected
         if expected[0] < NEVER:
-            assert prediction.reach_ball(C, body, lead, ball, expected[0] - 1)[0] == NEVER
+            assert reach_ball(body, lead, ball, expected[0] - 1)[0] == NEVER
 
 
 def test_skipping_cycles_finds_the_first_meeting_point():

@@ -6,17 +6,20 @@ import math
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
+from keepaway_sim.world.geometry import length
 from keepaway_sim.world.skills.prediction import (
     UNKNOWN_SPEED,
     Body,
     ball_ahead,
     ball_of,
-    body_of,
     cycles_to_point,
     reach_ball,
+    straight_distance,
+    straight_run,
 )
 
 LATELY = 3  # [cycles] P: motion seen longer ago is unknown
+SOON = 4  # [cycles] who is near the ball's place then is asked first
 UNSEEN_LEAD = 2  # [cycles] P: the start of an opponent who has not been seen moving lately
 
 
@@ -27,25 +30,62 @@ def as_last_seen(w, f, p, j):
     P predictNrCyclesToPoint: a player who may be first at the ball is taken to have run for it ever
     since; who has not been seen moving lately runs straight, and an opponent has a start.
     """
+    body, lead, faces = _last_place(w, f, p, j)
+    return _with_heading(w, f, p, j, body, faces), lead
+
+
+@compiled
+def _last_place(w, f, p, j):
+    """`as_last_seen` without the heading, and whether player p knows that."""
+    belief, memory, now = w.belief, w.memory, w.belief.cycle[f]
     if j == p:
-        return body_of(w, f, p, p), 0
-    memory, now = w.memory, w.belief.cycle[f]
+        x, y = belief.position[f, p, p]
+        vx, vy = belief.velocity[f, p, p]
+        return Body(x, y, vx, vy, 0.0, 0.0), 0, True
     x, y, vx, vy = memory.seen[f, p, j]
     lead = now - memory.motion_cycle[f, p, j]
     moves = lead <= LATELY
     if not moves:
         keeps, seeks = p < w.constants.num_keepers, j >= w.constants.num_keepers
         lead = UNSEEN_LEAD if keeps == seeks else 0
+        vx, vy = UNKNOWN_SPEED, 0.0
     lead = min(lead, now - memory.seen_cycle[f, p, j])
-    if not moves:
-        return Body(x, y, UNKNOWN_SPEED, 0.0, 0.0, 0.0), lead
+    return Body(x, y, vx, vy, 0.0, 0.0), lead, moves
+
+
+@compiled
+def _with_heading(w, f, p, j, body, faces):
+    """The Body with player j's heading; apart, for a sine costs as much as ruling a player out."""
+    if not faces:
+        return body
+    x, y, vx, vy, _, _ = body
     yaw = w.belief.body[f, p, j]
-    return Body(x, y, vx, vy, math.cos(yaw), math.sin(yaw)), lead
+    return Body(x, y, vx, vy, math.cos(yaw), math.sin(yaw))
+
+
+@compiled
+def _is_known(w, f, p, j):
+    return j == p or w.belief.age[f, p, j] <= w.constants.player_lost_age
+
+
+@compiled
+def _nearest(w, f, p, first, last, x, y):
+    """Which known player of first..last-1 was last seen nearest to a point; -1: none is known."""
+    nearest, best = -1, math.inf
+    for j in range(first, last):
+        if _is_known(w, f, p, j):
+            body, _, _ = _last_place(w, f, p, j)
+            away = (body.x - x) * (body.x - x) + (body.y - y) * (body.y - y)
+            if away < best:
+                nearest, best = j, away
+    return nearest
 
 
 @compiled
 def fastest_to_ball(w, f, p, first, last, ball, limit):
     """Which known player of first..last-1 reaches a ball first, in player p's belief.
+
+    Who is near is asked first: most others are then ruled out without a search.
 
     Args:
         ball: Ball.
@@ -53,30 +93,49 @@ def fastest_to_ball(w, f, p, first, last, ball, limit):
 
     Returns:
         the player (-1: nobody), how many cycles from now it meets the ball, how many it needs.
+        Who needs fewer cycles to the same place is faster, then who has the lower index.
     """
-    c, belief = w.constants, w.belief
+    c = w.constants
     fastest, when, needed = -1, limit + 1, NEVER
-    for j in range(first, last):
-        if j != p and belief.age[f, p, j] > c.player_lost_age:
+    near = -1
+    if limit >= 0:
+        x, y = ball_ahead(c, ball, min(SOON, limit))
+        near = _nearest(w, f, p, first, last, x, y)
+    for k in range(first - 1, last if near >= 0 else first - 1):
+        j = near if k < first else k
+        if k == near or not _is_known(w, f, p, j):
             continue
-        body, lead = as_last_seen(w, f, p, j)
-        i, cycles = reach_ball(c, body, lead, ball, min(when, limit))
-        if i < when or (i == when and cycles < needed):
+        body, lead, faces = _last_place(w, f, p, j)
+        until = min(when, limit)
+        start = straight_run(c, body, lead, ball, until)
+        if start > until:
+            continue
+        body = _with_heading(w, f, p, j, body, faces)
+        i, cycles = reach_ball(c, body, lead, ball, start, until)
+        if i < when or (i == when and (cycles < needed or (cycles == needed and j < fastest))):
             fastest, when, needed = j, i, cycles
     return fastest, when, needed
 
 
 @compiled
 def fastest_to_point(w, f, p, first, last, x, y):
-    """(player, cycles) of the known player of first..last-1 who is soonest at a point."""
-    c, belief = w.constants, w.belief
+    """(player, cycles) of the known player of first..last-1 who is soonest at a point.
+
+    Of players who are equally soon the one with the lowest index.
+    """
+    c = w.constants
     fastest, needed = -1, NEVER
-    for j in range(first, last):
-        if j != p and belief.age[f, p, j] > c.player_lost_age:
+    near = _nearest(w, f, p, first, last, x, y)
+    for k in range(first - 1, last if near >= 0 else first - 1):
+        j = near if k < first else k
+        if k == near or not _is_known(w, f, p, j):
             continue
-        body, lead = as_last_seen(w, f, p, j)
+        body, lead, faces = _last_place(w, f, p, j)
+        if straight_distance(c, body, needed + lead) < length(x - body.x, y - body.y):
+            continue
+        body = _with_heading(w, f, p, j, body, faces)
         cycles = max(cycles_to_point(c, body, x, y) - lead, 0)
-        if cycles < needed:
+        if cycles < needed or (cycles == needed and j < fastest):
             fastest, needed = j, cycles
     return fastest, needed
 

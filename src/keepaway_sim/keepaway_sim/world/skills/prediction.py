@@ -20,6 +20,7 @@ BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
 UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
 TURNS = 3  # [cycles] of turning that a player may be spared where the ball comes its way
+ROUNDING = 1e-6  # [m] more than all rounding of a distance
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
@@ -213,7 +214,7 @@ def meeting_cycles(c, body, ball, old_x, old_y, has_old):
     first = Meeting(NEVER, 0.0, 0.0)
     kept, kept_off = Meeting(NEVER, 0.0, 0.0), SAME_POINT
     speed = length(ball.vx, ball.vy)
-    i = _straight_run(c, body, 0, ball, c.intercept_horizon)
+    i = straight_run(c, body, 0, ball, c.intercept_horizon)
     while i <= c.intercept_horizon:
         bx, by = ball_ahead(c, ball, i)
         off = length(bx - old_x, by - old_y) if has_old else math.inf
@@ -295,7 +296,7 @@ def cycles_to_point(c, body, to_x, to_y):
 
 
 @compiled
-def reach_ball(c, body, lead, ball, limit):
+def reach_ball(c, body, lead, ball, start, limit):
     """When a player reaches the moving ball.
 
     The first cycle i in which the ball's place i cycles ahead can be reached within i cycles
@@ -306,13 +307,14 @@ def reach_ball(c, body, lead, ball, limit):
         body: Body of the player.
         lead: cycles that it has been on its way already.
         ball: Ball.
-        limit: the last cycle that is looked at.
+        start: the first cycle that is looked at, as `straight_run` gives it.
+        limit: the last one.
 
     Returns:
         i, and the cycles that the player needs to there; NEVER, NEVER where i is beyond `limit`.
     """
     speed = length(ball.vx, ball.vy)
-    i = _straight_run(c, body, lead, ball, limit)
+    i = start
     while i <= limit:
         bx, by = ball_ahead(c, ball, i)
         needed = max(cycles_to_point(c, body, bx, by) - lead, 0)
@@ -324,15 +326,17 @@ def reach_ball(c, body, lead, ball, limit):
 
 
 @compiled
-def _straight_run(c, body, lead, ball, limit):
-    """Cycles before which nobody reaches the ball, even running straight without a turn.
+def straight_run(c, body, lead, ball, limit):
+    """Cycles before which a player does not reach the ball, even running straight without a turn.
 
     Beyond `limit` it is not looked for.
 
     The distance to a ball on a straight line is a convex function of the way it has rolled, so
     it falls by no more than it falls now; cycles in which it cannot have fallen enough are skipped.
     """
-    near = c.kickable_distance + length(body.vx, body.vy) * c.player_roll[ROLL_CYCLES - 1]
+    near = straight_distance(c, body, 0)
+    if _rolls_past(body, ball, c.ball_roll[limit], near + c.top_speed * (limit + lead)):
+        return limit + 1
     i = 0
     while i <= limit:
         bx, by = ball_ahead(c, ball, i)
@@ -345,6 +349,35 @@ def _straight_run(c, body, lead, ball, limit):
         left = _left_of_speed(c, c.ball_roll[i])
         i += max(int(gap / (c.top_speed + coming * left)), 1)
     return i
+
+
+@compiled
+def straight_distance(c, body, cycles):
+    """From no farther away [m] than this a player reaches a point within so many cycles.
+
+    It is reached by who faces it, at the speed the player has, and runs at full power.
+    """
+    rolled = length(body.vx, body.vy) * c.player_roll[ROLL_CYCLES - 1]
+    return c.kickable_distance + rolled + c.top_speed * cycles
+
+
+@compiled
+def _rolls_past(body, ball, roll, reach):
+    """Does a ball, rolling for `roll` times its speed, stay farther than `reach` from a player?
+
+    Without a division. Who is nearer by less than rounding can make up is not said to be passed.
+    """
+    rel_x, rel_y = body.x - ball.x, body.y - ball.y
+    along = rel_x * ball.vx + rel_y * ball.vy
+    square = ball.vx * ball.vx + ball.vy * ball.vy
+    reach = reach + ROUNDING
+    if along <= 0.0:  # it rolls away
+        return rel_x * rel_x + rel_y * rel_y > reach * reach
+    if along >= roll * square:  # it does not come so far
+        rel_x, rel_y = rel_x - roll * ball.vx, rel_y - roll * ball.vy
+        return rel_x * rel_x + rel_y * rel_y > reach * reach
+    across = rel_x * ball.vy - rel_y * ball.vx
+    return across * across > reach * reach * square
 
 
 @compiled
