@@ -12,7 +12,7 @@ from keepaway_sim.world.geometry import TWO_PI, length
 from keepaway_sim.world.hearing import hear, speak
 from keepaway_sim.world.memory import feel_self, forget, remember, roll_on
 from keepaway_sim.world.skills import tactics
-from keepaway_sim.world.skills.fastest import fastest_keeper
+from keepaway_sim.world.skills.fastest import fastest_keeper, nobody_asked
 from keepaway_sim.world.skills.running import expected_turn
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.streams import draw
@@ -260,19 +260,24 @@ def _perceive(w, f):
         if w.belief.cycle[f] > 0:
             remember(w, f, p)
         feel_self(w, f, p)
-        looks = sight.looks_now(w, f, p)
+        looks, chase = sight.looks_now(w, f, p), nobody_asked()
         if w.belief.cycle[f] > 0 and not (looks and sight.sees_all(w)):
-            roll_on(w, f, p)
+            chase = roll_on(w, f, p)
         if looks:
             sight.look(w, f, p)
+            chase = nobody_asked()
         if w.constants.hearing:
             hear(w, f, p)
-        _judge(w, f, p)
+        _judge(w, f, p, chase)
 
 
 @compiled
-def _judge(w, f, p):
-    """What follows from player p's belief: can it kick, who is nearest, must it decide?"""
+def _judge(w, f, p, chase):
+    """What follows from player p's belief: can it kick, who is nearest, must it decide?
+
+    Args:
+        chase: Chase, as `fastest_keeper` takes it.
+    """
     c, belief = w.constants, w.belief
     ball = belief.position[f, p, w.ball]
     known = belief.age[f, p, w.ball] <= c.ball_lost_age
@@ -283,7 +288,7 @@ def _judge(w, f, p):
     if p < c.num_keepers and belief.ball_kickable[f, p]:
         belief.cycles_to_ball[f, p, p] = 0
     elif known and (p < c.num_keepers or c.num_takers > 2):  # of two takers none marks
-        keeper, cycles = fastest_keeper(w, f, p)
+        keeper, cycles = fastest_keeper(w, f, p, chase)
         if keeper >= 0:
             belief.cycles_to_ball[f, p, keeper] = cycles
     belief.decision_due[f, p] = belief.outcome[f] == _IN_PLAY and not _goes_on_passing(w, f, p)

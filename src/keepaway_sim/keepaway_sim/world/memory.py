@@ -8,8 +8,7 @@ from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length, quantize, wrap
 from keepaway_sim.world.physics import dash_acceleration, kick_acceleration, limited
-from keepaway_sim.world.skills.fastest import fastest_to_ball
-from keepaway_sim.world.skills.prediction import ball_of
+from keepaway_sim.world.skills.fastest import fastest_opponent
 from keepaway_sim.world.state import DASH
 from keepaway_sim.world.streams import draw
 
@@ -86,12 +85,13 @@ def roll_on(w, f, p):
     P updateDynamicObjectForNextCycle: team-mates roll out, but for the first, who is never moved.
     The opponent who is fastest to the ball comes to it. Of the plans of the others nothing is
     known, and they drift along x: ahead while the ball flies ahead, else back.
+
+    Returns:
+        Chase: the opponent who comes to the ball.
     """
     c, belief = w.constants, w.belief
-    keeps = p < c.num_keepers
-    first, last = (c.num_keepers, w.num_players) if keeps else (0, c.num_keepers)
-    ball = ball_of(w, f, p)
-    chaser, _, _ = fastest_to_ball(w, f, p, first, last, ball, 2 * c.intercept_horizon - 1)
+    keeps, chase = p < c.num_keepers, fastest_opponent(w, f, p)
+    ball = chase.ball
     ahead = 1.0 if keeps else -1.0  # each team's own +x
     drift = DRIFT * (2.0 if abs(ball.vx) > FLYING_BALL else 1.0)
     drift = drift * ahead if ahead * ball.vx > 0.0 else -drift * ahead
@@ -101,14 +101,15 @@ def roll_on(w, f, p):
         if j in (p, unmoved) or belief.age[f, p, j] > c.player_lost_age:
             continue
         vx, vy = velocity[j, 0], velocity[j, 1]
-        if j == chaser:
+        if j == chase.player:
             vx, vy = toward(position[j, 0], position[j, 1], ball.x, ball.y, CHASE_SPEED)
-        elif first <= j < last:
+        elif not same_team(c, p, j):
             vx, vy = drift, 0.0
         position[j, 0] += vx
         position[j, 1] += vy
         velocity[j, 0] *= c.player_decay
         velocity[j, 1] *= c.player_decay
+    return chase
 
 
 @compiled

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length
 from keepaway_sim.world.skills.prediction import (
     UNKNOWN_SPEED,
+    Ball,
     Body,
     ball_ahead,
     ball_of,
@@ -140,19 +142,77 @@ def fastest_to_point(w, f, p, first, last, x, y):
     return fastest, needed
 
 
+class Chase(NamedTuple):
+    """Which opponent reaches the ball first, as a player worked it out, and from what."""
+
+    player: int  # -1: nobody
+    when: int  # [cycles] from now it meets the ball
+    needed: int  # [cycles] it needs to there
+    ball: Ball
+    num_known: int  # how many opponents were known; -1: this was not worked out
+
+
 @compiled
-def fastest_keeper(w, f, p):
+def fastest_opponent(w, f, p):
+    """The Chase of player p's opponents."""
+    first, last = _opponents(w, p)
+    ball = ball_of(w, f, p)
+    player, when, needed = fastest_to_ball(w, f, p, first, last, ball, _horizon(w))
+    return Chase(player, when, needed, ball, _num_known(w, f, p, first, last))
+
+
+@compiled
+def nobody_asked():
+    """The Chase that was not worked out."""
+    return Chase(-1, NEVER, NEVER, Ball(0.0, 0.0, 0.0, 0.0), -1)
+
+
+@compiled
+def fastest_keeper(w, f, p, chase):
     """The keeper who reaches the ball first, as player p believes, and the cycles it needs.
 
     P: where a taker is sooner at the ball, keepers ask who of them is soonest at that place.
     Takers only ask who of the keepers is first. (-1, NEVER) where nobody is known.
+
+    Args:
+        chase: Chase of this cycle; it is used if neither what is believed of the ball nor who is
+            known has changed since, and nothing was seen.
     """
-    c, n = w.constants, w.constants.num_keepers
-    ball = ball_of(w, f, p)
-    keeper, when, needed = fastest_to_ball(w, f, p, 0, n, ball, 2 * c.intercept_horizon - 1)
-    if p < n:
+    n, ball = w.constants.num_keepers, ball_of(w, f, p)
+    first, last = _opponents(w, p)
+    holds = chase.num_known == _num_known(w, f, p, first, last) and chase.ball == ball
+    if holds and p >= n:
+        return chase.player, chase.needed
+    taker, sooner = chase.player, chase.when
+    limit = sooner if holds and taker >= 0 else _horizon(w)
+    keeper, when, needed = fastest_to_ball(w, f, p, 0, n, ball, limit)
+    if p >= n:
+        return keeper, needed
+    if not holds:
         taker, sooner, _ = fastest_to_ball(w, f, p, n, w.num_players, ball, when - 1)
-        if taker >= 0:
-            x, y = ball_ahead(c, ball, sooner)
-            return fastest_to_point(w, f, p, 0, n, x, y)
+    if taker >= 0 and sooner < when:
+        x, y = ball_ahead(w.constants, ball, sooner)
+        return fastest_to_point(w, f, p, 0, n, x, y)
     return keeper, needed
+
+
+@compiled
+def _opponents(w, p):
+    """First and one past the last of player p's opponents."""
+    n = w.constants.num_keepers
+    return (n, w.num_players) if p < n else (0, n)
+
+
+@compiled
+def _horizon(w):
+    """The last cycle from now in which somebody is looked for at the ball."""
+    return 2 * w.constants.intercept_horizon - 1
+
+
+@compiled
+def _num_known(w, f, p, first, last):
+    count = 0
+    for j in range(first, last):
+        if _is_known(w, f, p, j):
+            count += 1
+    return count
