@@ -13,25 +13,23 @@ bag it has a line for every episode (CSV and Parquet), hold times, passes, losse
 study in a folder, and the page of what they show.
 """
 
+from __future__ import annotations
+
 import argparse
 import signal
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from keepaway_sim.analysis.report import analyse
 from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer import metrics
 from keepaway_transfer.errors import LogError, TransferError
-from keepaway_transfer.reports import plotting
-from keepaway_transfer.reports.evidence import Evidence, read_evidence, scratch_difference
-from keepaway_transfer.reports.kwy import KeepawayLog, read_kwy
-from keepaway_transfer.reports.page import page as page_of
-from keepaway_transfer.reports.page_figures import page_figures
-from keepaway_transfer.reports.report import write_report
-from keepaway_transfer.studies.results import pack, read_results
+
+if TYPE_CHECKING:
+    from keepaway_transfer.reports.kwy import KeepawayLog
 
 PAGE = Path("src/keepaway_transfer/docs/results.md")
 
@@ -56,6 +54,8 @@ def main() -> int:
 
 
 def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
+    from keepaway_sim.analysis.report import analyse
+
     out = out or (bag if bag.is_dir() else bag.parent) / "analysis"
     print(analyse(bag, out, number))
     print(f"Written to {out}: episodes.csv and .parquet, summary.json and four figures.")
@@ -63,6 +63,10 @@ def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
 
 
 def _analyse_study(folder: Path, arguments: argparse.Namespace) -> int:
+    # Here, because a bag needs no statistics: importing them takes seconds and 100 MB.
+    from keepaway_transfer.reports.report import write_report
+    from keepaway_transfer.studies.results import pack, read_results
+
     if arguments.beside:
         print(_scratch_line(folder, arguments.beside))
         return 0
@@ -77,6 +81,12 @@ def _analyse_study(folder: Path, arguments: argparse.Namespace) -> int:
 
 
 def _write_page(folder: Path, page: Path) -> int:
+    from keepaway_transfer.reports import plotting
+    from keepaway_transfer.reports.evidence import read_evidence
+    from keepaway_transfer.reports.page import page as page_of
+    from keepaway_transfer.reports.page_figures import page_figures
+    from keepaway_transfer.reports.report import write_report
+
     studies = read_evidence(folder)
     for name, one in studies.items():
         write_report(one.results, folder / name)
@@ -90,6 +100,9 @@ def _write_page(folder: Path, page: Path) -> int:
 
 
 def _scratch_line(first: Path, second: Path) -> str:
+    from keepaway_transfer.reports.evidence import Evidence, scratch_difference
+    from keepaway_transfer.studies.results import read_results
+
     one, other = (Evidence(read_results(folder)) for folder in (first, second))
     found = scratch_difference(one, other)
     if found is None:
@@ -102,6 +115,8 @@ def _scratch_line(first: Path, second: Path) -> str:
 
 def _logs_line(paths: list[Path], threshold: float, window: int) -> str:
     """What the logs of one training tell, taken together in their order."""
+    from keepaway_transfer.reports.kwy import read_kwy
+
     logs = [read_kwy(path) for path in paths]
     first = logs[0]
     for path, log in zip(paths, logs, strict=True):

@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from keepaway_sim.bags.gaps import gap_counter
 from keepaway_sim.bags.match_bag import EpisodeSummary, MatchBag
 from keepaway_sim.bags.moments import joined
 from keepaway_sim.task import Action, Outcome
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class EpisodeRow(NamedTuple):
@@ -203,5 +205,7 @@ def _counted(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 def episode_table(path: Path | str, number: int | None = None) -> pd.DataFrame:
     """The table of a match's finished episodes, a row each (see `EpisodeRow`)."""
+    import pandas as pd  # a second and 90 MB that nothing else here needs
+
     rows = list(Analyst(MatchBag(path, number)).rows())
     return pd.DataFrame(rows, columns=list(EpisodeRow._fields))
