@@ -1,9 +1,12 @@
-"""What the documentation promises: links lead somewhere, and tutorials run as written."""
+"""What the documentation promises: links lead somewhere, commands exist, tutorials run."""
 
+import functools
 import os
 import re
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +18,7 @@ PAGES = sorted(
     for page in ROOT.glob(pattern)
 )
 TUTORIALS = [
+    "README.md",
     "src/keepaway_transfer/docs/tutorial.md",
     "src/keepaway_agent/docs/write_an_agent.md",
 ]
@@ -44,6 +48,52 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
         if not target.exists() or (wants_heading and anchor not in anchors(target)):
             broken.append(link)
     assert not broken
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """The words of every command of a page that begins with a script of this project."""
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(?:sh)?\n(.*?)^```", text, re.M | re.S)
+    inline = re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.S))
+    for line in [*"\n".join(blocks).splitlines(), *inline]:
+        found = re.search(r"(?:^|[\s=])(scripts/[\w/]+(?:\.py)?(?=\s|$).*)", line)
+        if found:
+            yield shlex.split(found[1].replace("'", ""), comments=True)
+
+
+@functools.cache
+def help_of(script: Path) -> str:
+    """What a script prints about its options; a shell script, its text."""
+    if script.with_suffix(".py").exists():  # a shell script that starts it
+        script = script.with_suffix(".py")
+    if script.suffix != ".py":
+        return script.read_text(encoding="utf-8")
+    command = [sys.executable, str(script), "--help"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_command_has_its_script_and_every_option_is_known(page: Path) -> None:
+    unknown = []
+    for name, *words in commands(page):
+        script = ROOT / name
+        if script.is_dir():
+            continue
+        assert script.is_file(), name
+        for word in words:
+            if word in ("--", "--ros-args"):  # what follows is for another program
+                break
+            option = word.partition("=")[0]
+            if re.fullmatch(r"--[a-z][\w-]*", option) and option not in help_of(script):
+                unknown.append(f"{name} {option}")
+    assert not unknown
+
+
+def test_the_readmes_snippet_runs_as_written() -> None:
+    (snippet,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.M | re.S)
+    names: dict[str, object] = {}
+    exec(compile(snippet, "README.md", "exec"), names)
+    assert names["observation"] in names["env"].observation_space  # type: ignore[attr-defined]
 
 
 def test_a_site_is_built_of_all_pages_and_docstrings(tmp_path: Path) -> None:
