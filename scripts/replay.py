@@ -37,6 +37,7 @@ from keepaway_sim.cli.interrupts import Stopped
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.replayer import Replayer, ReplayerSettings, stoppable
+from keepaway_sim.version import code_version
 from keepaway_sim.wire.messages import SECOND
 
 
@@ -90,6 +91,8 @@ def check(path: Path, number: int) -> int:
             verdict = checked.difference or "the same, all of them"
             print(f"{who}: {checked.episodes} episodes, {checked.compared} {what}: {verdict}")
             differs |= checked.difference is not None
+        if differs and bag.match["code_version"] != code_version():
+            print(f"recorded by version {bag.match['code_version']}, this is {code_version()}")
     except (KeepawayError, AgentError) as error:
         print(f"replay: {error}", file=sys.stderr)
         return 1

@@ -46,7 +46,7 @@ def main() -> int:
             print(f"{made.path}: {made.message_count} messages; open it in Foxglove with {LAYOUT}")
             return 0
         if args.picture:
-            return take_picture(args, min(numbers) if numbers else 0)
+            return take_picture(args, min(numbers) if numbers else None)
         text, said = replay_page(args.bag, numbers, number=args.match)
     except KeepawayError as error:
         print(f"view: {error}", file=sys.stderr)
@@ -80,12 +80,15 @@ def watch(host: str, port: int, ros: list[str]) -> int:
         rclpy.try_shutdown()
 
 
-def take_picture(args: argparse.Namespace, number: int) -> int:
-    """Write a PNG of one moment."""
+def take_picture(args: argparse.Namespace, number: int | None) -> int:
+    """Write a PNG of one moment, of the bag's first episode if no other is chosen."""
     bag = MatchBag(args.bag, args.match)
-    episode = next((e for e in bag.episodes() if e.number == number), None)
-    if episode is None:
-        raise KeepawayError(f"episode {number} is not in {args.bag}")
+    episodes = {episode.number: episode for episode in bag.episodes()}
+    number = min(episodes, default=0) if number is None else number
+    if number not in episodes:
+        there = f"{min(episodes)}..{max(episodes)}" if episodes else "none that ended"
+        raise KeepawayError(f"episode {number} is not in {args.bag}: it has {there}")
+    episode = episodes[number]
     track = bag.track(episode)
     if not 0 <= args.time < math.inf:
         raise KeepawayError(f"--time {args.time}: give seconds since the episode's kick-off")

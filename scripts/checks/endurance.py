@@ -119,7 +119,8 @@ def watch(
     while not list((folder / "weights").glob("*.npz")):
         time.sleep(1.0)
         if time.monotonic() > until:
-            raise RuntimeError((folder / "match.err").read_text())
+            said = (folder / "match.err").read_text() or "it said nothing"
+            raise RuntimeError(f"no weights were saved within {PATIENCE:.0f} s: {said}")
     samples: dict[str, list[Sample]] = {}
     files_at_first = shared_files()
     until = time.monotonic() + seconds

@@ -4,9 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import layouts
 import pytest
 
 from keepaway_sim.bags.reader import BagReader
+from keepaway_sim.wire.cdr import codec
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -67,6 +69,23 @@ def test_refusals_are_one_line(script: str, arguments: list[str], complaint: str
     assert told.returncode in (1, 2)
     assert complaint in told.stderr
     assert "Traceback" not in told.stderr
+
+
+def test_a_picture_is_of_the_first_episode_that_is_there(bag_3v2: Path, tmp_path: Path) -> None:
+    later = [s for s in layouts.read(bag_3v2) if not is_first(s)]
+    bag = layouts.write(tmp_path / "later.mcap", later)
+    told = run("view", bag, "--picture", tmp_path / "first.png")
+    assert told.stdout == f"{tmp_path / 'first.png'}: episode 1 at 0.0 s\n", told.stderr
+    told = run("view", bag, "--picture", tmp_path / "none.png", "--episodes", "0")
+    assert (told.returncode, told.stderr) == (1, f"view: episode 0 is not in {bag}: it has 1..3\n")
+
+
+def is_first(said: layouts.Said) -> bool:
+    """Whether it is a clock, or about the episode with number 0."""
+    if said.topic in ("/clock", "/match"):
+        return said.topic == "/clock"
+    values = codec(said.message_type).decode(said.data)
+    return values.get("number" if said.topic == "/episode" else "episode") == 0
 
 
 def test_a_picture_of_nobodys_belief_is_refused(bag_3v2: Path, tmp_path: Path) -> None:

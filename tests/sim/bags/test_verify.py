@@ -1,5 +1,6 @@
 """A recorded match is played again and gives the same; whatever was changed in it is found."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from keepaway_sim.bags.verify import check_world
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.wire.cdr import codec
-from keepaway_sim.wire.messages import FIELD_STATE, PERCEPTION
+from keepaway_sim.wire.messages import FIELD_STATE, MATCH, PERCEPTION
 
 
 def test_a_recorded_match_replays(bag_3v2: Path) -> None:
@@ -44,6 +45,19 @@ def test_a_changed_number_is_found(
     difference = check_world(MatchBag(tmp_path / "bag")).difference
     assert difference == (what, 1, 3)
     assert str(difference) == f"{what} differs in episode 1 at cycle 3"
+
+
+def test_a_bag_of_a_version_with_a_setting_that_went_replays(bag_3v2: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for m in BagReader(bag_3v2).messages():
+            data = m.data
+            if m.message_type == MATCH:
+                values = codec(MATCH).decode(data)
+                config = json.loads(values["config_json"])
+                config["vision"]["hear_distance"] = 50.0
+                data = codec(MATCH).encode({**values, "config_json": json.dumps(config)})
+            bag.write(m.topic, m.message_type, data, m.log_time)
+    assert check_world(MatchBag(tmp_path / "bag")) == check_world(MatchBag(bag_3v2))
 
 
 def test_a_match_whose_beginning_is_missing_is_refused(bag_3v2: Path, tmp_path: Path) -> None:

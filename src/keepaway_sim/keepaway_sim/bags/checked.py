@@ -22,6 +22,7 @@ _LONGEST_JSON = 2**18  # [bytes]
 _DEEPEST_JSON = 8  # a configuration has 2
 _LONGEST_NAME = 100
 _FARTHEST = 1e4  # [m], [m/s], [rad]; nothing in a match is more
+_RETIRED = ("hear_distance",)  # settings of earlier versions
 _MOST = 2**31  # episodes, and cycles of an episode
 MOST_VALUES = 64
 """Action values of a request."""
@@ -69,6 +70,18 @@ def read_agents(text: str) -> dict[str, dict[str, Any]]:
                     f"info 'agents': {printable(name)}.{printable(key)} is no plain value"
                 )
     return agents
+
+
+def without_retired_settings(config: Any) -> Any:
+    """A configuration of any version without the settings that went, which nothing ever read."""
+    if not isinstance(config, dict):
+        return config
+    return {
+        name: {key: value for key, value in group.items() if key not in _RETIRED}
+        if isinstance(group, dict)
+        else group
+        for name, group in config.items()
+    }
 
 
 def kickable_distance(config: Any) -> float:

@@ -120,7 +120,7 @@ class MatchBag:
         """
         try:
             data = checked.read_json(self.match["config_json"], "config_json")
-            return Config.from_dict(data)
+            return Config.from_dict(checked.without_retired_settings(data))
         except (KeepawayError, OverflowError, AttributeError) as error:
             raise KeepawayError(f"{self.reader.path}: {error}") from error
 
