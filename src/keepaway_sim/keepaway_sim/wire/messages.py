@@ -49,7 +49,7 @@ class Request(NamedTuple):
     cycle: int
     action: int
     target: int
-    match_id: int = 0  # 0: not said
+    match_id: int = 0  # 0: not given
 
 
 def read_request(data: bytes) -> Request:
