@@ -17,7 +17,7 @@ import numpy as np
 from keepaway_sim.bags.blocks import Block, Piece, in_order
 from keepaway_sim.bags.spilling import spilled
 
-WINDOW_SIZE = 2**24  # [bytes] of messages that are brought into order together
+WINDOW_SIZE = 2**23  # [bytes] of messages that are brought into order together
 DEEPEST = 8  # windows of messages that may reach over one key without sorting them first
 
 
