@@ -4,8 +4,9 @@
 
 A match of 3v2 of a hundred episodes is played and recorded, and written again and again with later
 episodes and times until there are that many messages: once in order, once with its chunks in
-disorder. `analyze.py` and `view.py` read both; the table has their CPU time and memory. The results
-must be the same for both bags; ends with 1 where they are not.
+disorder. `analyze.py` and `view.py` read both; the table has their CPU time and memory, and where a
+Chromium is installed, how long it takes from its start until the page is shown. The results must be
+the same for both bags; ends with 1 where they are not.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import hashlib
 import os
 import random
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -39,6 +41,7 @@ from keepaway_sim.world.world import World
 SCRIPTS = Path(__file__).resolve().parents[1]
 TASK = "3v2"
 PASS_EVERY = 8  # [cycles]
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 CHUNK = 6000  # messages that are written together: a chunk of some 700 KB
 
 
@@ -168,9 +171,32 @@ def read(bag: Path, how: str, folder: Path) -> str:
     out, page = folder / f"{bag.name}-analysis", folder / f"{bag.name}.html"
     run(f"analyze.py, {how}", ["analyze.py", bag, "--out", out])
     run(f"view.py, {how}", ["view.py", bag, "--out", page])
-    print(f"  page of {page.stat().st_size / 1e6:.1f} MB")
+    empty = folder / "empty.html"
+    empty.write_text("<!doctype html><title>empty</title>")
+    size, seconds = page.stat().st_size / 1e6, [opened(each) for each in (page, empty)]
+    known = f": opened in {seconds[0]:.1f} s, an empty one in {seconds[1]:.1f} s" * (
+        None not in seconds
+    )
+    print(f"  its page has {size:.1f} MB{known}", flush=True)
     facts = re.sub(r"\d+ messages came", "messages came", page.read_text())
     return hashlib.sha256((out / "episodes.csv").read_bytes() + facts.encode()).hexdigest()
+
+
+def opened(page: Path) -> float | None:
+    """How long Chromium takes to start, open a page and tell what it shows [s]; None without one.
+
+    Raises:
+        AssertionError: the page's script did not run to its end.
+    """
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if not program:
+        return None
+    words = [program, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", page.as_uri()]
+    began = time.monotonic()
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    seconds = time.monotonic() - began
+    assert page.name == "empty.html" or " s, " in done.stdout.split('id="summary"')[1][:200]
+    return seconds
 
 
 def run(what: str, words: list[object]) -> None:
