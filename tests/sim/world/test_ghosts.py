@@ -1,6 +1,6 @@
-"""Whom players with a limited view feel, and what they believe of whom they should see.
+"""What players with a limited view believe of whom they should see, and do not.
 
-Source: P WorldModelUpdate.cc, mapUnknownPlayers, processNewObjectInfo and removeGhosts.
+Source: P WorldModelUpdate.cc, processNewObjectInfo and removeGhosts.
 """
 
 import math
@@ -15,55 +15,11 @@ approx = pytest.approx
 NARROW = noiseless(profile("2005", visible_angle=90.0))
 
 
-def felt_scene() -> Scene:
-    """1 faces away from a, which stands two metres behind it; 2 and b are out of sight."""
-    scene = Scene("a . 1 . . . . . 2", NARROW)
-    scene.put("2", -5.0, -12.0)
-    scene.lose("a")
-    scene.lose("2")
-    return scene
-
-
 def expect(scene: Scene, name: str, x: float, y: float, age: int) -> None:
     """Let 1 expect somebody at a place, seen `age` cycles ago."""
     j = scene.index(name)
     scene.belief.position[0, 0, j] = x, y
     scene.belief.age[0, 0, j] = age
-
-
-def test_who_is_felt_is_taken_for_who_is_expected_there():
-    scene = felt_scene()
-    expect(scene, "a", 0.5, 0.5, 4)
-    scene.look("1")
-    assert scene.seen("1", "a") == approx([-2.0, 0.0])
-    assert scene.belief.age[0, 0, scene.index("a")] == 0
-    assert scene.memory.nameless[0, 0, scene.index("a")]
-
-
-def test_who_is_felt_may_be_taken_for_somebody_else():
-    scene = felt_scene()
-    expect(scene, "2", 0.5, 0.5, 4)
-    scene.look("1")
-    assert scene.seen("1", "2") == approx([-2.0, 0.0])
-    assert scene.belief.age[0, 0, scene.index("a")] == NEVER
-
-
-@pytest.mark.parametrize(("age", "taken_for_2"), [(4, True), (3, False)])
-def test_nobody_is_expected_to_have_run_faster_than_players_can(age, taken_for_2):
-    # 6 m in 4 cycles: 4.8 m at full speed and 2 m for noise; in 3 cycles 5.6 m are too few
-    scene = felt_scene()
-    expect(scene, "2", 0.0, 6.0, age)
-    scene.look("1")
-    assert (scene.belief.age[0, 0, scene.index("2")] == 0) == taken_for_2
-    # else it fills the place of an opponent of whom nothing is known
-    assert (scene.belief.age[0, 0, scene.index("a")] == 0) == (not taken_for_2)
-
-
-def test_who_is_felt_and_can_be_nobody_is_passed_over():
-    scene = felt_scene()
-    expect(scene, "a", 9.0, 9.0, 2)
-    scene.look("1")
-    assert scene.belief.age[0, 0, scene.index("a")] == 2
 
 
 @pytest.mark.parametrize(("away", "forgotten"), [(2.0, True), (2.6, False)])
@@ -134,6 +90,8 @@ def test_an_opponent_who_is_not_felt_is_just_out_of_touch():
         ((5.0, 0.0), (5.0, 1.9), 1, None),  # he is too far away
         ((-2.6, 0.0), (-2.6, 1.9), 0, (-2.6, 1.9)),  # not where it must be felt
         ((-2.8, 0.0), (-2.8, 1.9), 0, (-2.8, 0.0)),  # behind, and not surely in touch
+        ((2.0, 0.0), (2.0, 1.9), 1, (2.0, 1.9)),  # neither seen nor felt
+        ((2.0, 0.0), (2.0, 1.9), 0, None),  # and the taker that is seen there has not got it
     ],
 )
 def test_a_ball_that_is_not_where_it_must_be(ball, taker, seen_ago, place):

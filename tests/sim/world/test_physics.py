@@ -167,7 +167,9 @@ def separated(places, radii, velocity=None):
     num = len(radii)
     places, none = np.zeros((num, 2)), np.zeros(1)
     collided = np.zeros(num, dtype=np.bool_)
-    scratch = Scratch(places.copy(), places, np.zeros(num), collided, none, places.copy())
+    numbers = np.zeros((num, 2), dtype=np.int64)
+    felt = np.zeros((num, 3))
+    scratch = Scratch(places.copy(), places, np.zeros(num), collided, none, felt, numbers)
     physics.separate(position, moving, np.array(radii), scratch)
     return position, moving
 

@@ -35,9 +35,11 @@ _DERIVED = (
     "sight_first",  # the first edge beyond each whole multiple of 1 / SIGHT_CELLS m
     "direction_cosine",  # of every direction that is seen, from -pi to pi
     "direction_sine",
+    "phantom_slots",  # beside the smaller team's own, see `phantoms`
     "open_x",  # (25,) [m] the points where a keeper may get open
     "open_y",
 )
+OPPONENT_SLOTS = 11  # P: MAX_OPPONENTS
 OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
 
 
@@ -66,8 +68,15 @@ def pack(task: Task, config: Config) -> Any:
     values |= _direction_tables(values["direction_step"])
     values["ball_roll"] = _roll_table(physics.ball_decay)
     values["player_roll"] = _roll_table(physics.player_decay)
+    values["phantom_slots"] = _phantom_slots(task, config.vision)
     values |= _open_points(task, values["open_border"])
     return Constants(**values)
+
+
+def _phantom_slots(task: Task, vision: Vision) -> int:
+    """How many opponents a player may believe in beyond those of the match, see `phantoms`."""
+    smaller = min(task.num_keepers, task.num_takers)
+    return 0 if vision.visible_angle_deg >= 360.0 else max(OPPONENT_SLOTS - smaller, 0)
 
 
 def _open_points(task: Task, border: float) -> dict[str, np.ndarray]:

@@ -61,7 +61,6 @@ def _kick_off(w, f):
         forget(w, f, p)
         speech.ball_age[f, p] = -1
         speech.opponent[f, p] = -1
-        speech.own_said[f, p] = False
     _perceive(w, f)
 
 

@@ -1,4 +1,9 @@
-"""What players say to their team, and what they make of what they hear."""
+"""What players say to their team, and what they make of what they hear.
+
+Players also say where they themselves are about to be, but nobody learns of it: P decodes a message
+as if the listener had said it (WorldModelUpdate.cc: processPlayerMessage gives the decoder the own
+number), and where it is itself a player knows better (processPerfectHearInfo). So it is left out.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +11,15 @@ from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length
 from keepaway_sim.world.memory import same_team
-from keepaway_sim.world.physics import dash_acceleration
 from keepaway_sim.world.skills.kicking import ball_after
-from keepaway_sim.world.state import DASH, KICK
+from keepaway_sim.world.skills.running import place_after
+from keepaway_sim.world.state import KICK
 from keepaway_sim.world.streams import draw
 
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
 CHANGED_VELOCITY = 0.3  # [m/cycle] or one whose idea of its velocity differs by more
 DEAF_RANGE = 3.0  # [m] P: nearer to the ball than this, a player trusts itself
+TOLD_AGE = 2  # [cycles] P: so old is what is told of an opponent
 SHARED_RANGE = 20.0  # [m] P: a player speaks of a ball it sees nearer than this
 
 
@@ -29,27 +35,25 @@ def hear(w, f, p):
     speaker = first + int(draw(w.random, f) * others)
     if speaker >= p:
         speaker += 1
-    if speech.own_said[f, speaker]:
-        x, y = speech.own[f, speaker]
-        _hear_of_player(w, f, p, speaker, x, y, 1)
     told = speech.opponent[f, speaker]
     if told >= 0:
         x, y = speech.opponent_position[f, speaker]
-        _hear_of_player(w, f, p, told, x, y, 2)
+        _hear_of_opponent(w, f, p, told, x, y)
     if speech.ball_age[f, speaker] >= 0:
         _hear_of_ball(w, f, p, speaker)
 
 
 @compiled
-def _hear_of_player(w, f, p, who, x, y, age):
-    """P processPerfectHearInfo: counts as seen `age` cycles ago, where nothing newer is known."""
+def _hear_of_opponent(w, f, p, who, x, y):
+    """P processPerfectHearInfo: counts as seen two cycles ago, where nothing newer is known."""
     belief, memory = w.belief, w.memory
-    if belief.age[f, p, who] > age or memory.nameless[f, p, who]:
+    if belief.age[f, p, who] > TOLD_AGE or memory.nameless[f, p, who]:
         belief.position[f, p, who, 0], belief.position[f, p, who, 1] = x, y
         belief.velocity[f, p, who, 0] = 0.0
         belief.velocity[f, p, who, 1] = 0.0
-        belief.age[f, p, who] = age
+        belief.age[f, p, who] = TOLD_AGE
         memory.nameless[f, p, who] = False
+        memory.behind[f, p, who] = TOLD_AGE
 
 
 @compiled
@@ -82,32 +86,17 @@ def _hear_of_ball(w, f, p, speaker):
 def speak(w, f, p, command):
     """Compose what player p tells its team-mates after it chose its Command.
 
-    A message holds ten characters (S): six for the ball, four for an opponent, three for the
-    own position, so the own position is left out where both others are told (P: makeSayMessage).
+    A message holds ten characters (S): six for the ball and four for an opponent (P:
+    makeSayMessage).
     """
     belief, speech = w.belief, w.speech
-    next_x, next_y = _own_place_after(w, f, p, command)
-    _speak_of_ball(w, f, p, command, next_x, next_y)
+    _speak_of_ball(w, f, p, command)
     nearest = _opponent_in_touch(w, f, p)
     speech.opponent[f, p] = nearest
     if nearest >= 0:
         x, y = belief.position[f, p, nearest]
         x, y = spelled(w.constants, p, x, y)
         speech.opponent_position[f, p, 0], speech.opponent_position[f, p, 1] = x, y
-    speech.own_said[f, p] = not (nearest >= 0 and speech.ball_age[f, p] >= 0)
-    speech.own[f, p, 0], speech.own[f, p, 1] = spelled(w.constants, p, next_x, next_y)
-
-
-@compiled
-def _own_place_after(w, f, p, command):
-    """Where player p expects to be a cycle later."""
-    belief = w.belief
-    x, y = belief.position[f, p, p]
-    vx, vy = belief.velocity[f, p, p]
-    ax, ay = 0.0, 0.0
-    if command.kind == DASH:
-        ax, ay = dash_acceleration(w.constants, command.power, belief.body[f, p, p])
-    return x + vx + ax, y + vy + ay
 
 
 @compiled
@@ -126,7 +115,7 @@ def _opponent_in_touch(w, f, p):
 
 
 @compiled
-def _speak_of_ball(w, f, p, command, next_x, next_y):
+def _speak_of_ball(w, f, p, command):
     """Tell of a ball that is seen, or that is about to leave player p's reach.
 
     Where the player kicks it away, it tells where that ball will be; a ball that stays in reach
@@ -137,6 +126,7 @@ def _speak_of_ball(w, f, p, command, next_x, next_y):
     distance = length(place[0] - own[0], place[1] - own[1])
     in_reach = distance < c.kickable_distance
     x, y, vx, vy = ball_after_command(w, f, p, command)
+    next_x, next_y = place_after(w, f, p, command)
     away = length(x - next_x, y - next_y)
     seen = belief.age[f, p, ball] == 0 and distance < SHARED_RANGE
     speech.ball_age[f, p] = -1

@@ -7,6 +7,7 @@ import math
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length, quantize, wrap
+from keepaway_sim.world.phantoms import age_of, grow_old, num_opponents, opponent, place_of, put
 from keepaway_sim.world.physics import dash_acceleration, kick_acceleration, limited
 from keepaway_sim.world.skills.fastest import fastest_opponent
 from keepaway_sim.world.state import DASH
@@ -36,6 +37,8 @@ def forget(w, f, p):
     memory.seen_cycle[f, p, :] = -NEVER
     memory.motion_cycle[f, p, :] = -NEVER
     memory.nameless[f, p, :] = False
+    memory.behind[f, p, :] = 0
+    w.phantoms.age[f, p, :] = NEVER
     memory.turned[f, p] = 0.0
     memory.kicked[f, p] = False
     memory.pass_cycle[f, p] = -2
@@ -66,16 +69,14 @@ def remember(w, f, p):
         vx, vy = limited(velocity[ball, 0] + ax, velocity[ball, 1] + ay, c.ball_speed_max)
         velocity[ball, 0], velocity[ball, 1] = vx, vy
     belief.body[f, p, p] = wrap(belief.body[f, p, p] + memory.turned[f, p])
-    for j in range(w.ball + 1):
-        if belief.age[f, p, j] < NEVER:
-            belief.age[f, p, j] += 1
-    opponent = nearest_opponent_to_ball(w, f, p)
+    grow_old(w, f, p)
+    holder = nearest_opponent_to_ball(w, f, p)
     position[ball, 0] += velocity[ball, 0]
     position[ball, 1] += velocity[ball, 1]
     velocity[ball, 0] *= c.ball_decay
     velocity[ball, 1] *= c.ball_decay
     if not kicked:
-        _stop_ball(w, f, p, opponent)
+        _stop_ball(w, f, p, holder)
 
 
 @compiled
@@ -84,12 +85,13 @@ def roll_on(w, f, p):
 
     P updateDynamicObjectForNextCycle: team-mates roll out, but for the first, who is never moved.
     The opponent who is fastest to the ball comes to it. Of the plans of the others nothing is
-    known, and they drift along x: ahead while the ball flies ahead, else back.
+    known, and they drift along x: ahead while the ball flies ahead, else back. What was heard of an
+    opponent was old, and makes up for it.
 
     Returns:
         Chase: the opponent who comes to the ball.
     """
-    c, belief = w.constants, w.belief
+    c, belief, memory = w.constants, w.belief, w.memory
     keeps, chase = p < c.num_keepers, fastest_opponent(w, f, p)
     ball = chase.ball
     ahead = 1.0 if keeps else -1.0  # each team's own +x
@@ -100,15 +102,22 @@ def roll_on(w, f, p):
     for j in range(w.num_players):
         if j in (p, unmoved) or belief.age[f, p, j] > c.player_lost_age:
             continue
-        vx, vy = velocity[j, 0], velocity[j, 1]
-        if j == chase.player:
-            vx, vy = toward(position[j, 0], position[j, 1], ball.x, ball.y, CHASE_SPEED)
-        elif not same_team(c, p, j):
-            vx, vy = drift, 0.0
-        position[j, 0] += vx
-        position[j, 1] += vy
+        if same_team(c, p, j):
+            position[j, 0] += velocity[j, 0]
+            position[j, 1] += velocity[j, 1]
         velocity[j, 0] *= c.player_decay
         velocity[j, 1] *= c.player_decay
+    for k in range(num_opponents(w, p)):
+        j = opponent(w, p, k)
+        if age_of(w, f, p, j) > c.player_lost_age:
+            continue
+        x, y = place_of(w, f, p, j)
+        vx, vy = toward(x, y, ball.x, ball.y, CHASE_SPEED) if j == chase.player else (drift, 0.0)
+        cycles = 1
+        if j < w.ball:
+            cycles += memory.behind[f, p, j]
+            memory.behind[f, p, j] = 0
+        put(w, f, p, j, x + cycles * vx, y + cycles * vy)
     return chase
 
 
@@ -128,28 +137,27 @@ def stop_ball_of_opponent(w, f, p):
 
 
 @compiled
-def _stop_ball(w, f, p, opponent):
+def _stop_ball(w, f, p, holder):
     """Believe that the ball lies still if it is within this opponent's reach; -1: nobody's."""
     position, velocity, ball = w.belief.position[f, p], w.belief.velocity[f, p], w.ball
-    if opponent < 0:
+    if holder < 0:
         return
-    dx = position[ball, 0] - position[opponent, 0]
-    dy = position[ball, 1] - position[opponent, 1]
-    if length(dx, dy) < w.constants.kickable_distance:
+    x, y = place_of(w, f, p, holder)
+    if length(position[ball, 0] - x, position[ball, 1] - y) < w.constants.kickable_distance:
         velocity[ball, 0], velocity[ball, 1] = 0.0, 0.0
 
 
 @compiled
 def nearest_opponent_to_ball(w, f, p):
-    """The known opponent believed nearest to the ball; -1: none is known."""
-    c, belief = w.constants, w.belief
-    num = w.num_players
+    """The known opponent believed nearest to the ball, be it a phantom; -1: none is known."""
+    bx, by = w.belief.position[f, p, w.ball]
     nearest, best = -1, math.inf
-    for j in range(num):
-        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
+    for k in range(num_opponents(w, p)):
+        j = opponent(w, p, k)
+        if age_of(w, f, p, j) > w.constants.player_lost_age:
             continue
-        dx = belief.position[f, p, j, 0] - belief.position[f, p, num, 0]
-        dy = belief.position[f, p, j, 1] - belief.position[f, p, num, 1]
+        x, y = place_of(w, f, p, j)
+        dx, dy = x - bx, y - by
         distance = dx * dx + dy * dy
         if distance < best:
             nearest, best = j, distance
@@ -216,11 +224,11 @@ def _bump_ball(w, f, p):
     own = belief.position[f, p, p]
     dx, dy = belief.position[f, p, ball, 0] - own[0], belief.position[f, p, ball, 1] - own[1]
     distance = length(dx, dy)
-    for j in range(ball):
-        if j == p or belief.age[f, p, j] > c.player_lost_age:
+    for j in range(ball + 1 + c.phantom_slots):
+        if j in (p, ball) or age_of(w, f, p, j) > c.player_lost_age:
             continue
-        away = length(belief.position[f, p, j, 0] - own[0], belief.position[f, p, j, 1] - own[1])
-        if away < distance:
+        x, y = place_of(w, f, p, j)
+        if length(x - own[0], y - own[1]) < distance:
             return
     angle = math.atan2(dy, dx)
     belief.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * math.cos(angle)

@@ -7,8 +7,7 @@ between looks, 100 ms cycles), `hear` takes what a team-mate said.
 Source: S visualsenderplayer.cpp for what is seen, P WorldModelUpdate.cc for what is made of it.
 Simplified against P, and why: own position is the truth plus an error that stays between looks
 (P: a particle filter over flags; the error is as large as was measured on the real server); players
-beyond the distance at which numbers are readable are not confused with each other; there is no room
-for opponents who are none (P may count a felt team-mate as a third taker).
+beyond the distance at which numbers are readable are not confused with each other.
 """
 
 from __future__ import annotations
@@ -19,9 +18,10 @@ from typing import NamedTuple
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import SIGHT_CELLS
 from keepaway_sim.world.geometry import TWO_PI, bearing, length, quantize, rotated, wrap
-from keepaway_sim.world.ghosts import feel_somebody, forget_double, remove_ghosts
+from keepaway_sim.world.ghosts import forget_double, remove_ghosts
 from keepaway_sim.world.memory import stop_ball_of_opponent
 from keepaway_sim.world.streams import draw
+from keepaway_sim.world.touch import feel_players
 
 DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is rounded to it
 
@@ -74,6 +74,7 @@ def look(w, f, p):
             away = _reported_distance(c, distance)
             w.scratch.felt[j, 0] = belief.position[f, p, p, 0] + away * ux
             w.scratch.felt[j, 1] = belief.position[f, p, p, 1] + away * uy
+            w.scratch.felt[j, 2] = away
             continue
         moves = seen and _velocity_visible(w, f, distance)
         _see(w, f, p, j, Glimpse(dx, dy, distance, ux, uy, seen, moves))
@@ -84,9 +85,7 @@ def look(w, f, p):
     if belief.age[f, p, w.ball] == 0 and out_of_reach:
         stop_ball_of_opponent(w, f, p)
     if not sees_all(w):
-        for j in range(w.num_players):
-            if not math.isnan(w.scratch.felt[j, 0]):
-                feel_somebody(w, f, p, w.scratch.felt[j, 0], w.scratch.felt[j, 1])
+        feel_players(w, f, p)
         remove_ghosts(w, f, p)
 
 

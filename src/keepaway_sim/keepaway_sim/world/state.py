@@ -69,6 +69,7 @@ class Memory(NamedTuple):
     seen_cycle: np.ndarray  # (F, P, P) int64 cycle in which another was seen or felt last
     motion_cycle: np.ndarray  # (F, P, P + 1) int64 cycle in which its motion was seen last
     nameless: np.ndarray  # (F, P, P) bool: another was felt last, and may be another player
+    behind: np.ndarray  # (F, P, P) int64 cycles by which another's place was old when heard of
     command: np.ndarray  # (F, P, 3) kind, power, angle of the last command
     turned: np.ndarray  # (F, P) [rad] own turn expected of the last command
     kicked: np.ndarray  # (F, P) bool: the last command kicked the ball
@@ -81,6 +82,15 @@ class Memory(NamedTuple):
     search_sign: np.ndarray  # (F, P) which way round
 
 
+class Phantoms(NamedTuple):
+    """Opponents in whom a player with a limited view believes beside the real ones (S slots)."""
+
+    position: np.ndarray  # (F, P, S, 2) [m]
+    age: np.ndarray  # (F, P, S) int32 [cycles] since felt; NEVER: an empty slot
+    felt: np.ndarray  # (F, P, S, 2) [m] where it was felt last
+    felt_cycle: np.ndarray  # (F, P, S) int64 and in which cycle
+
+
 class Speech(NamedTuple):
     """What every player says this cycle, heard by team-mates in the next."""
 
@@ -88,8 +98,6 @@ class Speech(NamedTuple):
     ball_age: np.ndarray  # (F, P) int32 [cycles]; -1: nothing said of the ball
     opponent: np.ndarray  # (F, P) int32 player told of; -1: none
     opponent_position: np.ndarray  # (F, P, 2) [m]
-    own: np.ndarray  # (F, P, 2) [m] own next position
-    own_said: np.ndarray  # (F, P) bool
 
 
 class Discs(NamedTuple):
@@ -115,7 +123,8 @@ class Scratch(NamedTuple):
     num_pushes: np.ndarray  # (P + 1,)
     collided: np.ndarray  # (P + 1,) bool
     congestion: np.ndarray  # (25,) [1/m] of the points where a keeper may get open
-    felt: np.ndarray  # (P, 2) [m] where a player who is only felt seems to be; NaN: not felt
+    felt: np.ndarray  # (P, 3) [m] x, y, distance of a player who is only felt; NaN: not felt
+    numbers: np.ndarray  # (P, 2) int64 the numbers that it may have, from .. to
 
 
 class Fields(NamedTuple):
@@ -127,6 +136,7 @@ class Fields(NamedTuple):
     truth: Truth
     belief: Belief
     memory: Memory
+    phantoms: Phantoms
     speech: Speech
     bodies: Discs
     random: Draws  # a stream for each field
@@ -144,6 +154,7 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
         truth=_make_truth(num_fields, num_players),
         belief=_make_belief(num_fields, num_players),
         memory=_make_memory(num_fields, num_players),
+        phantoms=_make_phantoms(num_fields, num_players, constants.phantom_slots),
         speech=_make_speech(num_fields, num_players),
         bodies=bodies,
         random=random,
@@ -153,7 +164,8 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
             num_pushes=np.zeros(objects),
             collided=np.zeros(objects, dtype=np.bool_),
             congestion=np.zeros(len(constants.open_x)),
-            felt=np.zeros((num_players, 2)),
+            felt=np.zeros((num_players, 3)),
+            numbers=np.zeros((num_players, 2), dtype=np.int64),
         ),
     )
 
@@ -200,6 +212,7 @@ def _make_memory(num_fields: int, num_players: int) -> Memory:
         seen_cycle=np.full((*shape, num_players), -NEVER, dtype=np.int64),
         motion_cycle=np.full((*shape, num_players + 1), -NEVER, dtype=np.int64),
         nameless=np.zeros((*shape, num_players), dtype=np.bool_),
+        behind=np.zeros((*shape, num_players), dtype=np.int64),
         command=np.zeros((*shape, 3)),
         turned=np.zeros(shape),
         kicked=np.zeros(shape, dtype=np.bool_),
@@ -213,6 +226,17 @@ def _make_memory(num_fields: int, num_players: int) -> Memory:
     )
 
 
+def _make_phantoms(num_fields: int, num_players: int, num_slots: int) -> Phantoms:
+    """Empty slots."""
+    shape = (num_fields, num_players, num_slots)
+    return Phantoms(
+        position=np.zeros((*shape, 2)),
+        age=np.full(shape, NEVER, dtype=np.int32),
+        felt=np.zeros((*shape, 2)),
+        felt_cycle=np.full(shape, -NEVER, dtype=np.int64),
+    )
+
+
 def _make_speech(num_fields: int, num_players: int) -> Speech:
     """Speech of players who said nothing."""
     shape = (num_fields, num_players)
@@ -221,6 +245,4 @@ def _make_speech(num_fields: int, num_players: int) -> Speech:
         ball_age=np.full(shape, -1, dtype=np.int32),
         opponent=np.full(shape, -1, dtype=np.int32),
         opponent_position=np.zeros((*shape, 2)),
-        own=np.zeros((*shape, 2)),
-        own_said=np.zeros(shape, dtype=np.bool_),
     )

@@ -193,7 +193,7 @@ class World:
     def _arrays(self) -> list[np.ndarray]:
         """All arrays with a row for each field that outlive a cycle."""
         w = self.fields
-        return [*w.truth, *w.belief, *w.memory, *w.speech]
+        return [*w.truth, *w.belief, *w.memory, *w.phantoms, *w.speech]
 
     def _check_field(self, field: int) -> None:
         if not 0 <= field < self.num_fields:

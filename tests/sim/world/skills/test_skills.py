@@ -59,6 +59,20 @@ def test_a_ball_that_lies_well_lets_the_keeper_turn_to_its_direction_of_play():
     assert scene.command("1", HOLD) == approx((TURN, 0.0, -30.0))
 
 
+@pytest.mark.parametrize(("name", "goal_x"), [("1", 52.5), ("a", -52.5)])
+def test_who_holds_the_ball_turns_to_the_goal_of_a_whole_pitch(name, goal_x):
+    # P holdBall: getPosOpponentGoal, whatever the field; S: a pitch is 105 m long
+    scene = Scene("2 . 1 o")
+    scene.lose("2")
+    scene.put(name, 2.0, 10.0)
+    reach = REACH if name == "1" else 0.385 + 0.3 * 0.7
+    scene.put("o", 2.0 + reach, 10.0)
+    action = HOLD if name == "1" else GO
+    kind, _, moment = scene.command(name, action)
+    assert kind == TURN
+    assert moment == approx(math.degrees(math.atan2(-10.0, goal_x - 2.0)))
+
+
 def test_a_ball_that_would_leave_is_brought_back():
     scene = Scene("1 o")
     scene.put("o", REACH, 0.0)
@@ -384,3 +398,37 @@ def test_a_neck_is_turned_only_where_the_view_is_limited():
     assert abs(math.degrees(scene.belief.neck[0, 0])) == approx(90.0)
     scene.command("1", GO)  # looks at the ball, also at (-, -)
     assert np.isfinite(scene.belief.neck[0, 0])
+
+
+def narrow(drawing: str) -> Scene:
+    scene = Scene(drawing)
+    scene.change(visible_angle=math.pi / 2)
+    return scene
+
+
+def test_a_player_looks_at_where_the_ball_will_be_from_where_it_will_be():
+    scene = narrow("1 . . . . . . . o")
+    scene.put("o", 8.0, 0.5)
+    scene.move("o", 0.1, 0.1)
+    kind, power, _ = scene.command("1", GO)
+    assert (kind, power) == (DASH, 100.0)
+    seen_from = 0.6  # after a dash
+    assert scene.belief.neck[0, 0] == approx(math.atan2(0.6, 8.1 - seen_from))
+
+
+def test_who_has_the_ball_leaves_its_neck_as_it_is():
+    scene = narrow("a o 1")
+    scene.put("o", 0.0, 0.8)
+    scene.put("1", 0.9, 0.8)
+    scene.belief.neck[0] = 0.5
+    scene.command("a", GO)
+    scene.command("1", HOLD)
+    assert scene.belief.neck[0, [0, scene.index("a")]] == approx([0.5, 0.5])
+
+
+def test_a_taker_that_leaves_the_ball_to_another_looks_ahead():
+    scene = narrow("a . . . b o")
+    scene.put("o", 4.5, 0.0)
+    scene.belief.neck[0] = 0.5
+    scene.command("a", GO)
+    assert scene.belief.neck[0, scene.index("a")] == 0.0

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import length
+from keepaway_sim.world.phantoms import age_of, num_opponents, opponent
 from keepaway_sim.world.skills.prediction import (
     UNKNOWN_SPEED,
     Ball,
@@ -120,6 +121,28 @@ def fastest_to_ball(w, f, p, first, last, ball, limit):
 
 
 @compiled
+def _first_opponent(w, f, p, ball, limit):
+    """`fastest_to_ball` among all of player p's opponents, its phantoms among them."""
+    c, phantoms = w.constants, w.phantoms
+    first, last = _opponents(w, p)
+    fastest, when, needed = fastest_to_ball(w, f, p, first, last, ball, limit)
+    for s in range(c.phantom_slots):
+        if phantoms.age[f, p, s] > c.player_lost_age:
+            continue
+        x, y = phantoms.felt[f, p, s]
+        body = Body(x, y, UNKNOWN_SPEED, 0.0, 0.0, 0.0)
+        lead = min(UNSEEN_LEAD, w.belief.cycle[f] - phantoms.felt_cycle[f, p, s])
+        until = min(when, limit)
+        start = straight_run(c, body, lead, ball, until)
+        if start > until:
+            continue
+        i, cycles = reach_ball(c, body, lead, ball, start, until)
+        if i < when or (i == when and cycles < needed):
+            fastest, when, needed = w.ball + 1 + s, i, cycles
+    return fastest, when, needed
+
+
+@compiled
 def fastest_to_point(w, f, p, first, last, x, y):
     """(player, cycles) of the known player of first..last-1 who is soonest at a point.
 
@@ -155,10 +178,9 @@ class Chase(NamedTuple):
 @compiled
 def fastest_opponent(w, f, p):
     """The Chase of player p's opponents."""
-    first, last = _opponents(w, p)
     ball = ball_of(w, f, p)
-    player, when, needed = fastest_to_ball(w, f, p, first, last, ball, _horizon(w))
-    return Chase(player, when, needed, ball, _num_known(w, f, p, first, last))
+    player, when, needed = _first_opponent(w, f, p, ball, _horizon(w))
+    return Chase(player, when, needed, ball, _num_known(w, f, p))
 
 
 @compiled
@@ -172,24 +194,25 @@ def fastest_keeper(w, f, p, chase):
     """The keeper who reaches the ball first, as player p believes, and the cycles it needs.
 
     P: where a taker is sooner at the ball, keepers ask who of them is soonest at that place.
-    Takers only ask who of the keepers is first. (-1, NEVER) where nobody is known.
+    Takers only ask who of the keepers is first. (-1, NEVER) where nobody is known, or where it is
+    a phantom, which no perception can name.
 
     Args:
         chase: Chase of this cycle; it is used if neither what is believed of the ball nor who is
             known has changed since, and nothing was seen.
     """
     n, ball = w.constants.num_keepers, ball_of(w, f, p)
-    first, last = _opponents(w, p)
-    holds = chase.num_known == _num_known(w, f, p, first, last) and chase.ball == ball
-    if holds and p >= n:
-        return chase.player, chase.needed
+    holds = chase.num_known == _num_known(w, f, p) and chase.ball == ball
+    if p >= n:
+        keeper, needed = chase.player, chase.needed
+        if not holds:
+            keeper, _, needed = _first_opponent(w, f, p, ball, _horizon(w))
+        return (keeper, needed) if keeper < n else (-1, NEVER)
     taker, sooner = chase.player, chase.when
     limit = sooner if holds and taker >= 0 else _horizon(w)
     keeper, when, needed = fastest_to_ball(w, f, p, 0, n, ball, limit)
-    if p >= n:
-        return keeper, needed
     if not holds:
-        taker, sooner, _ = fastest_to_ball(w, f, p, n, w.num_players, ball, when - 1)
+        taker, sooner, _ = _first_opponent(w, f, p, ball, when - 1)
     if taker >= 0 and sooner < when:
         x, y = ball_ahead(w.constants, ball, sooner)
         return fastest_to_point(w, f, p, 0, n, x, y)
@@ -210,9 +233,10 @@ def _horizon(w):
 
 
 @compiled
-def _num_known(w, f, p, first, last):
+def _num_known(w, f, p):
+    """How many opponents player p knows, phantoms among them."""
     count = 0
-    for j in range(first, last):
-        if _is_known(w, f, p, j):
+    for k in range(num_opponents(w, p)):
+        if age_of(w, f, p, opponent(w, p, k)) <= w.constants.player_lost_age:
             count += 1
     return count

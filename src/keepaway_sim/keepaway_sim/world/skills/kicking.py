@@ -6,7 +6,7 @@ import math
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import clip, length, wrap
-from keepaway_sim.world.memory import same_team
+from keepaway_sim.world.phantoms import age_of, num_opponents, opponent, place_of, yaw_of
 from keepaway_sim.world.physics import kick_acceleration, kick_rate, limited
 from keepaway_sim.world.skills.running import turn_body_to
 from keepaway_sim.world.state import KICK, NONE, Command
@@ -25,12 +25,13 @@ PRESSED_RANGE = 2.0  # [m]
 @compiled
 def closest_opponent_to(w, f, p, x, y):
     """(player, distance) of the known opponent nearest to a point; (-1, inf) without one."""
-    c, belief = w.constants, w.belief
     nearest, best = -1, math.inf
-    for j in range(w.num_players):
-        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
+    for k in range(num_opponents(w, p)):
+        j = opponent(w, p, k)
+        if age_of(w, f, p, j) > w.constants.player_lost_age:
             continue
-        away = length(belief.position[f, p, j, 0] - x, belief.position[f, p, j, 1] - y)
+        ox, oy = place_of(w, f, p, j)
+        away = length(ox - x, oy - y)
         if away < best:
             nearest, best = j, away
     return nearest, best
@@ -63,12 +64,12 @@ def hold_ball(w, f, p, distance):
     px, py = belief.position[f, p, p]
     bx, by = belief.position[f, p, ball]
     yaw = belief.body[f, p, p]
-    opponent, away = closest_opponent_to(w, f, p, bx, by)
+    nearest, away = closest_opponent_to(w, f, p, bx, by)
     angle = 0.0
-    if opponent >= 0 and away < HOLD_RANGE:
-        ox, oy = belief.position[f, p, opponent]
+    if nearest >= 0 and away < HOLD_RANGE:
+        ox, oy = place_of(w, f, p, nearest)
         from_opponent = math.atan2(py - oy, px - ox)
-        heads_left = wrap(belief.body[f, p, opponent] - from_opponent) > 0.0
+        heads_left = wrap(yaw_of(w, f, p, nearest) - from_opponent) > 0.0
         angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - yaw)
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
     spot = length(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))

@@ -6,6 +6,7 @@ import math
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import length, wrap
+from keepaway_sim.world.physics import dash_acceleration
 from keepaway_sim.world.skills.prediction import dash_power, turn_moment
 from keepaway_sim.world.state import DASH, TURN, Command
 
@@ -18,6 +19,18 @@ def expected_turn(w, f, p, command):
         return 0.0
     speed = length(belief.velocity[f, p, p, 0], belief.velocity[f, p, p, 1])
     return command.angle / (1.0 + c.inertia_moment * speed)
+
+
+@compiled
+def place_after(w, f, p, command):
+    """Where player p expects to be a cycle after a command."""
+    belief = w.belief
+    x, y = belief.position[f, p, p]
+    vx, vy = belief.velocity[f, p, p]
+    ax, ay = 0.0, 0.0
+    if command.kind == DASH:
+        ax, ay = dash_acceleration(w.constants, command.power, belief.body[f, p, p])
+    return x + vx + ax, y + vy + ay
 
 
 @compiled

@@ -16,13 +16,14 @@ from keepaway_sim.task import Action
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.geometry import TWO_PI, cone_contains, length, wrap
-from keepaway_sim.world.memory import same_team
+from keepaway_sim.world.phantoms import age_of, num_opponents, opponent, place_of
 from keepaway_sim.world.sight import turn_neck
 from keepaway_sim.world.skills.kicking import hold_ball, kick_to
 from keepaway_sim.world.skills.meeting import intercept
 from keepaway_sim.world.skills.running import (
     expected_turn,
     move_to,
+    place_after,
     search,
     turn_body_along,
     turn_body_to,
@@ -42,14 +43,16 @@ MARK_LEAD = 1.0  # [m] P: a marked player is expected so far toward the marker's
 
 @compiled
 def command(w, f, p, action, target):
-    """This cycle's command of player p for a requested action.
+    """This cycle's command of player p for a requested action; also turns its neck.
+
+    Who has the ball leaves its neck as it is (P: KeepawayPlayer.cc).
 
     Args:
         action, target: as requested; a keeper that cannot kick goes to the ball instead of
             holding or passing.
 
     Returns:
-        Command; also turns the neck where vision is limited.
+        Command.
     """
     c, belief = w.constants, w.belief
     ball = w.ball
@@ -65,10 +68,15 @@ def command(w, f, p, action, target):
         _look_at(w, f, p, 0.0, 0.0, chosen)
     elif action == _MARK:
         chosen = _patient(w, f, p, mark_keeper(w, f, p, target))
-        _look_at(w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], chosen)
+        _look_at_ball(w, f, p, chosen)
+    elif p >= c.num_keepers and _has_ball(w, f, p):
+        chosen = _patient(w, f, p, hold_ball(w, f, p, c.taker_hold_distance))
+    elif p >= c.num_keepers and _mate_has_ball(w, f, p):
+        chosen = _patient(w, f, p, watch_ball(w, f, p))
+        belief.neck[f, p] = 0.0
     else:
-        chosen = _patient(w, f, p, go_to_ball(w, f, p))
-        _look_at(w, f, p, belief.position[f, p, ball, 0], belief.position[f, p, ball, 1], chosen)
+        chosen = _patient(w, f, p, intercept(w, f, p))
+        _look_at_ball(w, f, p, chosen)
     return _whole(c, chosen)
 
 
@@ -101,9 +109,20 @@ def _whole(c, chosen):
 
 @compiled
 def _look_at(w, f, p, x, y, chosen):
-    c = w.constants
+    """Where vision is limited, look at a point from where player p will be after a command."""
+    c, own = w.constants, w.belief.position[f, p, p]
     if c.visible_angle < TWO_PI - 1e-9:
+        next_x, next_y = place_after(w, f, p, chosen)
+        x, y = x + own[0] - next_x, y + own[1] - next_y
         turn_neck(w, f, p, x, y, expected_turn(w, f, p, chosen))
+
+
+@compiled
+def _look_at_ball(w, f, p, chosen):
+    """Where vision is limited, look at where the ball will be (P: turnNeckToObject)."""
+    x, y = w.belief.position[f, p, w.ball]
+    vx, vy = w.belief.velocity[f, p, w.ball]
+    _look_at(w, f, p, x + vx, y + vy, chosen)
 
 
 @compiled
@@ -169,13 +188,13 @@ def open_point(w, f, p, from_x, from_y):
     Congestion is the sum over all other players of 1 / distance. The centre if every lane is
     blocked.
     """
-    c, belief, congestion = w.constants, w.belief, w.scratch.congestion
+    c, congestion = w.constants, w.scratch.congestion
     x, y = c.open_x, c.open_y
     congestion[:] = 0.0
-    for j in range(w.num_players):
-        if j == p or belief.age[f, p, j] > c.player_lost_age:
+    for j in range(w.ball + 1 + c.phantom_slots):
+        if j in (p, w.ball) or age_of(w, f, p, j) > c.player_lost_age:
             continue
-        px, py = belief.position[f, p, j]
+        px, py = place_of(w, f, p, j)
         for k in range(len(congestion)):
             dx, dy = px - x[k], py - y[k]
             congestion[k] += 1.0 / math.sqrt(dx * dx + dy * dy + 1e-18)
@@ -194,45 +213,54 @@ def open_point(w, f, p, from_x, from_y):
 
 @compiled
 def _lane_blocked(w, f, p, from_x, from_y, x, y):
-    c, belief = w.constants, w.belief
-    for j in range(w.num_players):
-        if same_team(c, p, j) or belief.age[f, p, j] > c.player_lost_age:
+    c = w.constants
+    for k in range(num_opponents(w, p)):
+        j = opponent(w, p, k)
+        if age_of(w, f, p, j) > c.player_lost_age:
             continue
-        ox, oy = belief.position[f, p, j]
+        ox, oy = place_of(w, f, p, j)
         if cone_contains(ox, oy, from_x, from_y, x, y, c.cone_width):
             return True
     return False
 
 
 @compiled
-def go_to_ball(w, f, p):
-    """Intercept the ball; a taker that has it holds it, and leaves it to a team-mate that has."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    bx, by = belief.position[f, p, ball]
-    if p >= c.num_keepers:
-        if belief.ball_kickable[f, p] and nearest_to_ball(w, f, p, c.num_keepers, ball) == p:
-            return hold_ball(w, f, p, c.taker_hold_distance)
-        nearest = nearest_to_ball(w, f, p, 0, ball)
-        if nearest != p and nearest >= c.num_keepers:
-            ox, oy = belief.position[f, p, nearest]
-            if length(ox - bx, oy - by) < c.kickable_distance:
-                vx, vy = belief.velocity[f, p, ball]
-                return turn_body_to(w, f, p, bx + vx, by + vy, 1)
-    return intercept(w, f, p)
+def _has_ball(w, f, p):
+    """Can a taker kick the ball, and is no other taker nearer to it? Then it holds it."""
+    first, ball = w.constants.num_keepers, w.ball
+    return w.belief.ball_kickable[f, p] and nearest_to_ball(w, f, p, first, ball) == p
+
+
+@compiled
+def _mate_has_ball(w, f, p):
+    """Has another taker the ball? Then it is left to it."""
+    c, ball = w.constants, w.ball
+    nearest = nearest_to_ball(w, f, p, 0, ball + 1 + c.phantom_slots)
+    if nearest == p or not c.num_keepers <= nearest < ball:
+        return False
+    x, y = w.belief.position[f, p, nearest]
+    bx, by = w.belief.position[f, p, ball]
+    return length(x - bx, y - by) < c.kickable_distance
+
+
+@compiled
+def watch_ball(w, f, p):
+    """Turn to where the ball will be."""
+    bx, by = w.belief.position[f, p, w.ball]
+    vx, vy = w.belief.velocity[f, p, w.ball]
+    return turn_body_to(w, f, p, bx + vx, by + vy, 1)
 
 
 @compiled
 def nearest_to_ball(w, f, p, first, last):
-    """The known player of first..last-1 believed nearest to the ball; p itself counts always."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
+    """Whom of first..last-1 player p knows and believes nearest to the ball; itself it knows."""
+    bx, by = w.belief.position[f, p, w.ball]
     nearest, best = -1, math.inf
     for j in range(first, last):
-        if j != p and belief.age[f, p, j] > c.player_lost_age:
+        if j == w.ball or (j != p and age_of(w, f, p, j) > w.constants.player_lost_age):
             continue
-        dx = belief.position[f, p, j, 0] - belief.position[f, p, ball, 0]
-        dy = belief.position[f, p, j, 1] - belief.position[f, p, ball, 1]
+        x, y = place_of(w, f, p, j)
+        dx, dy = x - bx, y - by
         away = dx * dx + dy * dy
         if away < best:
             nearest, best = j, away
