@@ -88,8 +88,9 @@ def learned_numbers(trials: int, short: bool) -> dict[str, Any]:
     total, begins = (400, (0, 200)) if short else (5400, (0, 2800, 5200))
     config = LearnerConfig(ordering="k1", tile_widths="framework")
     trained = Training(task="3v2", learner=config, episodes=total, seed=measure.SEED)
-    durations, stages = learned.learn_in_stages(trained, trials, begins, measure.POINT)
-    blocks = durations.reshape(trials, -1, measure.POINT).mean(axis=2)
+    played = learned.learn_in_stages(trained, trials, begins, measure.POINT)
+    stages = played.stages
+    blocks = played.durations.reshape(trials, -1, measure.POINT).mean(axis=2)
     return {
         "curves_s": blocks.round(3).tolist(),
         "stages": [
@@ -101,7 +102,23 @@ def learned_numbers(trials: int, short: bool) -> dict[str, Any]:
             for stage in stages
         ],
         "belief_errors": learned.belief_errors(stages[-1].held),
+        "processes": [
+            {
+                "task": "3v2",
+                "policy": f"learned, {total} episodes",
+                "ours": measure.summarize(played.trajectories, "3v2")["statistics"],
+                "reference": learned_reference(),
+            }
+        ],
     }
+
+
+def learned_reference() -> dict[str, float]:
+    """What the real server's recording of learned keepers gives."""
+    recorded = reference.recorded("2005", "3v2", "learned")
+    assert recorded is not None
+    statistics: dict[str, float] = recorded["statistics"]
+    return statistics
 
 
 def write_page(folder: Path, part: dict[str, Any]) -> int:

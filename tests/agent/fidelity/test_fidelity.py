@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from keepaway_agent.fidelity import learned, page, trajectories
-from keepaway_agent.fidelity.reference import Cell, reference_cells
+from keepaway_agent.fidelity.reference import Cell, recorded, reference, reference_cells
 
 DOCS = Path(__file__).resolve().parents[3] / "src" / "keepaway_sim" / "docs"
 
@@ -95,6 +95,30 @@ def test_process_statistics_of_a_pass():
     assert found["keeper_kicks"] == 1
     assert found["taker_speed"] == pytest.approx(1.0)
     assert np.isnan(found["first_taker_reach"])
+
+
+def test_learned_play_stands_beside_the_real_servers_on_the_page():
+    columns = reference("hold_times")["E05"]["learned_3v2"]["behaviour"]["columns"]
+    recorded_play = recorded("2005", "3v2", "learned")
+    assert recorded_play is not None
+    learned_part = {
+        "curves_s": [[7.0, 8.0], [8.0, 10.0]],
+        "stages": [{"begin": 2800, "behaviour": dict.fromkeys(columns, 0.5)}],
+        "belief_errors": learned.belief_errors(PLAYED),
+        "processes": [
+            {
+                "task": "3v2",
+                "policy": "learned",
+                "ours": dict.fromkeys(recorded_play["statistics"], 2.0),
+                "reference": recorded_play["statistics"],
+            }
+        ],
+    }
+    made = {"learned": {"command": "fidelity.py --learned", "code_version": "1"}}
+    lines = page.page({"learned": learned_part, "made": made}).splitlines()
+    assert "| 400 | 9.0 ± 2.8 | 8.0 | 7.6 | 5.7 | 7.5 |" in lines
+    assert "| K1 to T1 | without | 0.50, 0.00 | 0.48, 0.38 |" in lines
+    assert f"| passes | 2 : {recorded_play['statistics']['passes']:.3g} |" in lines
 
 
 def test_the_page_is_what_its_numbers_say():

@@ -3,7 +3,9 @@
 Sources: S visualsenderplayer.cpp (what is seen) and P WorldModelUpdate.cc (what is made of it).
 """
 
+import json
 import math
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -177,6 +179,14 @@ def test_the_error_of_the_own_position_moves_everything_seen():
     scene.look("1", 1.0, 0.25)  # +0.15 along x, -0.075 along y
     assert scene.belief.position[0, 0, 0] == approx([0.15, -0.075])
     assert scene.belief.position[0, 0, scene.ball] == approx([5.15, -0.075])
+
+
+def test_the_own_position_is_known_as_well_as_was_measured_on_the_real_server():
+    # P: a particle filter over flags; evenly spread errors along each axis
+    file = resources.files("keepaway_sim") / "reference" / "hold_times.json"
+    measured = json.loads(file.read_text())["E05"]["belief_errors_of_keepers"]
+    spread = profile("2005").vision.self_position_error / math.sqrt(3.0)
+    assert spread == approx(measured["K1_to_centre"]["with_look_sd"], abs=0.001)
 
 
 def test_the_error_of_the_own_direction_turns_everything_seen():

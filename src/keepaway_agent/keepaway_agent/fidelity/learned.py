@@ -2,7 +2,8 @@
 
 Keepers learn from scratch (`learn_in_stages`); from their weights at each stage they play on,
 learning, for some hundred episodes, and a `Witness` of every trial notes each cycle in which a
-keeper has the ball: what it does, and by how much its belief is off. `behaviour` and
+keeper has the ball: what it does, and by how much its belief is off. From their last weights they
+play some more, of which the true positions are kept. `behaviour` and
 `belief_errors` are the reference's measures of the real server (`learned_3v2` and
 `belief_errors_of_keepers` in `keepaway_sim/reference/hold_times.json`).
 """
@@ -16,11 +17,15 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from keepaway_agent.actions import Action
+from keepaway_agent.fidelity.measure import TrajectoryRecorder
+from keepaway_agent.fidelity.trajectories import Trajectories
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.training import Training
 from keepaway_agent.training.trial import Moment, StopRule, TrialResult, child_seed
 from keepaway_sim.world.config import CYCLE_TIME
 
+RECORDED: Final = 20
+"""Episodes of every trial of which true positions are kept, after it has learned."""
 NEAR_BINS: Final = ((2.0, 3.0), (3.0, 4.0), (4.0, 5.0), (6.0, 10.0))
 """[m] Distances to the nearest taker for which the reference has the share of holding."""
 
@@ -43,6 +48,14 @@ class LearnedStage(NamedTuple):
     begin: int  # episodes learned before
     durations: np.ndarray  # (num_episodes,) [s]
     held: Held
+
+
+class LearnedPlay(NamedTuple):
+    """How keepers learn, and how they play."""
+
+    durations: np.ndarray  # (num_trials, num_episodes) [s] of the episodes that they learn from
+    stages: list[LearnedStage]
+    trajectories: Trajectories  # of what they play after they have learned
 
 
 class Witness:
@@ -83,7 +96,7 @@ def _distances(position: np.ndarray, keeper: int, num_keepers: int) -> np.ndarra
 
 def learn_in_stages(
     training: Training, num_trials: int, begins: Sequence[int], episodes: int
-) -> tuple[np.ndarray, list[LearnedStage]]:
+) -> LearnedPlay:
     """Let keepers learn, and play on from their weights at each stage.
 
     Args:
@@ -91,9 +104,6 @@ def learn_in_stages(
         num_trials: played side by side.
         begins: numbers of episodes after which a stage begins.
         episodes: of every trial in a stage.
-
-    Returns:
-        durations (num_trials, training.episodes) [s], and the stages.
     """
     trials = [
         dataclasses.replace(training.trial(k, None), snapshots=tuple(begins))
@@ -102,7 +112,26 @@ def learn_in_stages(
     trainer = Trainer(training.trainer, num_trials)
     results = sorted(trainer.run(trials), key=lambda result: int(result.trial.label))
     stages = [_play_on(trainer, results, begin, episodes) for begin in begins]
-    return np.stack([result.durations for result in results]) * CYCLE_TIME, stages
+    durations = np.stack([result.durations for result in results]) * CYCLE_TIME
+    return LearnedPlay(durations, stages, _record(trainer, results))
+
+
+def _record(trainer: Trainer, results: Sequence[TrialResult]) -> Trajectories:
+    """Every trial goes on from its last weights, learning, for RECORDED episodes."""
+    recorder = TrajectoryRecorder(len(results))
+    trials = [
+        dataclasses.replace(
+            result.trial,
+            seed=child_seed(result.trial.seed, _RECORDED),
+            stop=StopRule(max_episodes=RECORDED),
+            keeper_weights=result.keeper_weights,
+            snapshots=(),
+        )
+        for result in results
+    ]
+    for _ in trainer.run(trials, watch_cycle=recorder):
+        pass
+    return recorder.trajectories()
 
 
 def _play_on(
@@ -131,6 +160,7 @@ def _play_on(
 
 
 _STAGE: Final = 2  # first entry of a stage's spawn key, beside the world's 0 and the policies' 1
+_RECORDED: Final = 3
 
 
 def behaviour(stage: LearnedStage) -> dict[str, float]:

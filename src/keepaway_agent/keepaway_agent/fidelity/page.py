@@ -107,6 +107,8 @@ def _learned(learned: Mapping[str, Any]) -> list[str]:
         table(header[: 2 + len(curves)], rows),
         _behaviour(learned["stages"]),
         _beliefs(learned["belief_errors"]),
+        "How learned keepers play, means of an episode:\n",
+        _processes(learned["processes"]),
     ]
 
 
@@ -124,7 +126,7 @@ def _behaviour(stages: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _beliefs(ours: Mapping[str, Mapping[str, Sequence[float]]]) -> str:
-    theirs = reference("hold_times")["E05"]["learned_3v2"]["belief_errors_of_keepers"]
+    theirs = reference("hold_times")["E05"]["belief_errors_of_keepers"]
     rows = []
     for name, errors in ours.items():
         for look, (bias, spread) in errors.items():

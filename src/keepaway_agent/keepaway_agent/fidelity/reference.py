@@ -95,8 +95,13 @@ def reference_curves(profile: str) -> list[np.ndarray]:
 
 def reference_processes(cell: Cell) -> dict[str, Any] | None:
     """`episodes`, `cycles` of each and mean `statistics` of recorded play; None: not recorded."""
-    recorded = reference("process_statistics")["recorded"].get(SESSIONS[cell.profile], {})
     if cell.visible_angle != 360:
         return None
-    found: dict[str, Any] | None = recorded.get(cell.task, {}).get(cell.policy)
+    return recorded(cell.profile, cell.task, cell.policy)
+
+
+def recorded(profile: str, task: str, policy: str) -> dict[str, Any] | None:
+    """`reference_processes` by names, where `policy` may be `learned` as well."""
+    tasks = reference("process_statistics")["recorded"].get(SESSIONS[profile], {})
+    found: dict[str, Any] | None = tasks.get(task, {}).get(policy)
     return found

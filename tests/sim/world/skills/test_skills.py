@@ -408,12 +408,12 @@ def narrow(drawing: str) -> Scene:
 
 def test_a_player_looks_at_where_the_ball_will_be_from_where_it_will_be():
     scene = narrow("1 . . . . . . . o")
-    scene.put("o", 8.0, 0.5)
-    scene.move("o", 0.1, 0.1)
+    scene.put("o", 8.0, 0.8)
+    scene.move("o", 0.3, 0.0)
     kind, power, _ = scene.command("1", GO)
     assert (kind, power) == (DASH, 100.0)
     seen_from = 0.6  # after a dash
-    assert scene.belief.neck[0, 0] == approx(math.atan2(0.6, 8.1 - seen_from))
+    assert scene.belief.neck[0, 0] == approx(math.atan2(0.8, 8.3 - seen_from))
 
 
 def test_who_has_the_ball_leaves_its_neck_as_it_is():
