@@ -85,3 +85,38 @@ def test_a_short_endurance_run_ends_with_a_table(ros_domain: int) -> None:
     assert "nothing is missing" in done.stdout, done.stderr
     told = [line.split()[0] for line in done.stdout.splitlines() if "->" in line]
     assert {"recorder_0", "viewer", "match", "simulator", "keeper_1", "taker_2"} <= set(told)
+
+
+def test_readers_of_small_hostile_bags_keep_to_their_limits() -> None:
+    command = [sys.executable, str(ROOT / "scripts/checks/limits.py"), "--made", "1", "--domain"]
+    done = subprocess.run([*command, "78"], capture_output=True, text=True, check=False)
+    rows = [line.rsplit(maxsplit=6) for line in done.stdout.splitlines()[1:]]
+    assert [row[0] for row in rows] == [*load("limits").BAG_READERS]
+    wrong = [line for line in done.stderr.splitlines() if not line.endswith("s of CPU")]
+    assert wrong == []  # how long it takes depends on what else the machine does
+
+
+def test_what_is_wrong_with_a_reader_is_said() -> None:
+    faults = load("limits").faults
+    assert list(faults("refused\n", [], 1, 1.0, 100.0)) == []
+    page = '<script id="data" type="application/json">{"x":NaN}</script>'
+    said = "Traceback (most recent call last):\n\x1b[31m"
+    assert list(faults(said, [page], 139, 6.0, 501.0)) == [
+        "code 139",
+        "6.0 s of CPU",
+        "501 MB",
+        "a traceback",
+        f"prints what rules a terminal: {said!a}",
+        "NaN in a page",
+    ]
+    assert list(faults("", [], 1, 1.0, 100.0)) == ["refused without a word"]
+
+
+def test_a_long_bag_gives_the_same_numbers_in_any_order_of_its_chunks() -> None:
+    command = [sys.executable, str(ROOT / "scripts/checks/long_bag.py"), "--messages", "30000"]
+    done = subprocess.run(
+        [*command, "--episodes", "5"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("nothing is missing of") == 2
+    assert done.stdout.endswith("the same numbers from both\n")

@@ -7,7 +7,8 @@ import pytest
 from keepaway_sim.bags.gaps import GapCounter
 from keepaway_sim.bags.reader import BagReader
 from keepaway_sim.bags.topics import Recorded
-from keepaway_sim.wire.messages import ACTION_REQUEST, PERCEPTION
+from keepaway_sim.wire.cdr import codec
+from keepaway_sim.wire.messages import ACTION_REQUEST, EPISODE, FIELD_STATE, PERCEPTION
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +60,21 @@ def test_a_perception_sent_again_is_counted_once(recorded: list[Recorded]) -> No
     assert counter.topics["/taker_1/perception"].repeated == 1
     assert set(counter.missing().values()) == {0}
     assert set(counter.unanswered_decisions().values()) == {0}
+
+
+def test_messages_of_another_match_are_not_counted_but_said(recorded: list[Recorded]) -> None:
+    counter = GapCounter(match_id=7)
+    kinds = (FIELD_STATE, PERCEPTION, EPISODE, ACTION_REQUEST)
+    for message in recorded:
+        if message.message_type not in kinds:
+            continue
+        layout = codec(message.message_type)
+        for match_id in (7, 8):
+            data = layout.encode({**layout.decode(message.data), "match_id": match_id})
+            counter.feed(message.topic, message.message_type, data)
+    others = sum(message.message_type in kinds for message in recorded)
+    alone = counted(recorded).report()
+    assert counter.report() == f"{alone}; {others} messages are of another match"
 
 
 def test_a_lost_request_is_named_by_its_player(recorded: list[Recorded]) -> None:

@@ -98,6 +98,28 @@ def test_a_new_match_begins_anew(bag_3v2: Path) -> None:
     assert [kind for kind, _ in match.history] == ["match"]
 
 
+def test_messages_of_another_match_on_the_same_topics_are_not_shown(
+    bag_3v2: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "FRAME_PERIOD", 0.0)
+    own: list[Event] = []
+    both: list[Event] = []
+    own_match, mixed = LiveMatch(own.append), LiveMatch(both.append)
+    for message in BagReader(bag_3v2).messages():
+        if message.topic == "/clock":
+            continue
+        layout = codec(message.message_type)
+        said = layout.decode(message.data)
+        data = layout.encode({**said, "match_id": 7})
+        for match in (own_match, mixed):
+            match.feed(message.message_type, data)
+        if message.message_type != MATCH:
+            mixed.feed(message.message_type, layout.encode({**said, "match_id": 8}))
+        own_match.show()
+        mixed.show()
+    assert both == own
+
+
 def test_it_listens_to_this_machine_only(server: Server) -> None:
     assert server.address[0] == "127.0.0.1"
     assert server.url == f"http://127.0.0.1:{server.address[1]}/"

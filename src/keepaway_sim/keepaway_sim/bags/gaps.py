@@ -29,6 +29,7 @@ from keepaway_sim.wire.messages import (
     EPISODE,
     FIELD_STATE,
     PERCEPTION,
+    match_of,
     read_head,
 )
 
@@ -83,6 +84,8 @@ class GapCounter:
         problems: of the recording's files, in words.
         repeated: messages that came again, besides those of `topics`.
         silent: topics of requests of which nothing came, where nobody knows what was due.
+        match_id: of the match that is counted; 0: none is known, and all messages are counted.
+        strange: messages of other matches on the same topics, which are not counted.
     """
 
     selected: bool = False
@@ -91,6 +94,8 @@ class GapCounter:
     problems: list[str] = field(default_factory=list)
     repeated: int = 0
     silent: list[str] = field(default_factory=list)
+    match_id: int = 0
+    strange: int = 0
     _open: dict[int, dict[tuple[int, int], bool]] = field(default_factory=dict)
     _newest: tuple[int, int] = (-1, -1)  # episode and cycle of the last perception
     _begun: set[int] = field(default_factory=set)  # episodes of which something came
@@ -103,6 +108,9 @@ class GapCounter:
 
     def feed(self, topic: str, message_type: str, data: bytes) -> None:
         """Count one message. Other types than those of episodes and cycles are passed over."""
+        if self.match_id and match_of(message_type, data) not in (0, self.match_id):
+            self.strange += 1
+            return
         if message_type == EPISODE:
             self._told.add(int(codec(EPISODE).decode(data)["number"]))
         if message_type not in _EVERY_CYCLE:
@@ -193,6 +201,8 @@ class GapCounter:
         parts = losses or [f"nothing is missing of {self.received} perceptions and states"]
         parts += self.problems
         again = self.repeated + sum(count.repeated for count in self.topics.values())
+        if self.strange:
+            parts = [*parts, f"{self.strange} messages are of another match"]
         if again:
             parts = [*parts, f"{again} messages came more than once, and count once"]
         joined_at = self.start() / 1e9
@@ -260,10 +270,7 @@ def gap_counter(bag: MatchBag) -> GapCounter:
     counter.expect_match(bag.match, bag.namespace)
     counter.tell_ends(bag)
     counter.problems = list(bag.reader.problems)
-    if bag.found.strange:
-        counter.problems.append(
-            f"{bag.found.strange} messages are of a match that the bag does not describe"
-        )
+    counter.strange = bag.found.strange
     counts = bag.found.counts
     for seen, asked in zip(*map(bag.player_topics, ("perception", "action_request")), strict=True):
         if not counts.get(seen) and not counts.get(asked):  # nobody knows what was due

@@ -208,6 +208,7 @@ class Recorder(Node):
         except KeepawayError as error:
             self.get_logger().warning(f"match: {error}", throttle_duration_sec=LOG_PERIOD)
             return
+        self.gaps.match_id = self.gaps.match_id or match["match_id"]
         self._listen_to_players(match["player_names"])
 
     def _listen_to_players(self, names: Sequence[str]) -> None:

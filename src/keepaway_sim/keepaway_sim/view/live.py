@@ -46,6 +46,7 @@ class LiveMatch:
         self._send = send
         self._task: Task | None = None
         self._match: Event | None = None
+        self._match_id = 0
         self._episodes: list[Event] = []
         self._moments: dict[tuple[int, int], _Moment] = {}
         self._sent_at = 0.0
@@ -69,6 +70,8 @@ class LiveMatch:
         try:
             if message_type == messages.MATCH:
                 return self._begin(codec(message_type).decode(data))
+            if messages.match_of(message_type, data) not in (0, self._match_id):
+                return []  # another simulator publishes in this namespace
             if self._task is not None and message_type == messages.EPISODE:
                 self._end_episode(codec(message_type).decode(data))
             elif self._task is not None:
@@ -104,7 +107,7 @@ class LiveMatch:
             raise ValueError(f"players {ascii(names)[:100]}, not {', '.join(task.player_names)}")
         event = ("match", _json(match_data(said)))
         with self._lock:
-            self._task, self._match = task, event
+            self._task, self._match, self._match_id = task, event, said.get("match_id", 0)
             self._moments.clear()
             self._episodes.clear()
         self._send(event)

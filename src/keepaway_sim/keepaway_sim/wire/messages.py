@@ -37,6 +37,7 @@ _SEEN = struct.Struct("<4xiIB3xIIB?")  # stamp, player, episode, cycle, outcome,
 _REQUEST = struct.Struct("<4xB3xIIBB2xI")  # CDR header, then ActionRequest up to its values' count
 _REQUEST_HEAD = struct.Struct("<4xB3xII")  # CDR header, player, episode, cycle
 _MATCH_ID = struct.Struct("<Q")
+_OF_A_MATCH = (PERCEPTION, FIELD_STATE, EPISODE)
 _VALUES_AT = 28  # [bytes] where an ActionRequest's values begin
 _TAIL = struct.Struct(f"<QiII{len(FRAME) + 1}s2x")  # match_id, then the header, at a message's end
 
@@ -98,6 +99,17 @@ def read_match_id(data: bytes) -> int:
         return 0
     match_id, _, _, _, frame = _TAIL.unpack_from(data, len(data) - _TAIL.size)
     return int(match_id) if frame == FRAME.encode() + b"\0" else 0
+
+
+def match_of(message_type: str, data: bytes) -> int:
+    """The match that a message of any type belongs to; 0 where it does not say.
+
+    Raises:
+        struct.error: an ActionRequest of too few bytes.
+    """
+    if message_type == ACTION_REQUEST:
+        return read_request(data).match_id
+    return read_match_id(data) if message_type in _OF_A_MATCH else 0
 
 
 def read_time(data: bytes) -> int:
