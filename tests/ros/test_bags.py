@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import layouts
 import pytest
 from graph import PATIENCE, Graph
 from recorded import record_match
@@ -17,7 +18,7 @@ from rosbags.highlevel import AnyReader
 
 from keepaway_agent.actions import Role
 from keepaway_agent.nodes.player import PlayerNode
-from keepaway_msgs.msg import ActionRequest
+from keepaway_msgs.msg import ActionRequest, Match
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.reader import BagReader
@@ -25,6 +26,7 @@ from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer
 from keepaway_sim.nodes.spectator import Spectator
+from keepaway_sim.ros.publishing import LATCHED
 from keepaway_sim.view.server import Server
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,6 +86,26 @@ def test_a_replay_says_byte_for_byte_what_was_recorded(
     info = BagReader(tmp_path / "again").info
     assert info["gaps"].startswith("nothing is missing")
     assert not any(json.loads(info["missing"]).values())
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_topic_that_ros_cannot_have_is_left_out(bag: Path, tmp_path: Path) -> None:
+    messages = layouts.read(bag)
+    episode = next(said for said in messages if said.topic == "/episode")
+    odd = [episode._replace(topic=name) for name in ("/a b", "/\x1b[31mred", "episode//", "/7")]
+    path = layouts.write(tmp_path / "odd.mcap", [*messages, *odd])
+    said = replay(path, "--rate", "0", "--start-delay", "0")
+    assert said == f"published {len(messages)} messages\n"
+
+
+def test_players_with_odd_names_are_not_listened_to(graph: Graph, tmp_path: Path) -> None:
+    recorder = start_recorder(graph, tmp_path / "heard")
+    publisher = graph.node.create_publisher(Match, "match", LATCHED)
+    publisher.publish(Match(task="1v1", num_keepers=1, player_names=["a b", "\x1b[31m"]))
+    graph.spin_until(lambda: recorder.poll() > 0)
+    assert recorder.gaps.topics == {}
+    assert recorder.finish() == "no perception and no state was recorded"
+    recorder.destroy_node()
 
 
 def start_recorder(graph: Graph, path: Path, **parameters: object) -> Recorder:
