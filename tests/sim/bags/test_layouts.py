@@ -201,6 +201,8 @@ def test_two_matches_at_once_on_the_same_topics_are_told_apart_by_their_numbers(
         assert count_gaps(match).report() == count_gaps(MatchBag(bag)).report()
         assert replay_page(path, number=number)[0] == replay_page(bag)[0]
         assert str(check_world(match)) == str(check_world(MatchBag(bag)))
+        counted = ("/perception", "/field_state", "/action_request")
+        assert match.message_count == sum(m.topic.endswith(counted) for m in said)
         own = {m.data for m in said if m.message_type.startswith("keepaway_msgs/")}
         assert {m.data for m in match.timeline.messages(kept(match))} == own
         marked = with_markers(path, tmp_path / f"marked_{number}", number)

@@ -105,7 +105,7 @@ def summarise_match(bag: MatchBag, tally: Tally) -> dict[str, Any]:
         "task": bag.match["task"],
         "seed": bag.match["seed"],
         "code_version": bag.match["code_version"],
-        "messages": bag.reader.message_count,
+        "messages": bag.message_count,
         "episodes": count,
         "mean_duration_s": float(durations.mean()) if count else None,
         "sem_duration_s": float(durations.std(ddof=1) / np.sqrt(count)) if count > 1 else None,

@@ -89,6 +89,8 @@ class MatchBag:
         match: the Match message's fields.
         task: who plays, on what field.
         timeline: its messages, and what was recorded with them, as they came.
+        message_count: of the bag; where it has several matches, this one's perceptions, field
+            states and requests.
     """
 
     def __init__(self, path: Path | str, number: int | None = None) -> None:
@@ -110,6 +112,8 @@ class MatchBag:
         self.namespace = self.found.namespace
         others = [match for match in matches if match is not self.found]
         self.timeline = Timeline(self.reader, self.found, others)
+        own = sum(self.found.counts.values())
+        self.message_count = own if others else self.reader.message_count
 
     @functools.cached_property
     def config(self) -> Config:
