@@ -1,5 +1,6 @@
 """What a bag, a match or a player is called is shown as plain text, wherever it is shown."""
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +14,9 @@ from keepaway_sim.wire.cdr import codec
 
 ROOT = Path(__file__).resolve().parents[2]
 ESCAPES = "\x1b[31mred\x07\u202e<script>alert(1)</script>"
+AGENTS = json.dumps(
+    {f"{team}_{n}": {ESCAPES: 7} for team in ("keeper", "taker") for n in (1, 2, 3)}
+)
 TOOLS = {
     "analyze": ("--out", "{out}/analysis"),
     "view": ("--out", "{out}/page.html"),
@@ -57,7 +61,7 @@ BAGS: dict[str, Callable[[Many], Many]] = {
 def test_no_tool_prints_what_rules_a_terminal_or_is_html(
     messages: Many, tmp_path: Path, kind: str
 ) -> None:
-    bag = write(tmp_path / "bag.mcap", BAGS[kind](messages), {"agents": '{"\\u001b": 7}'})
+    bag = write(tmp_path / "bag.mcap", BAGS[kind](messages), {"agents": AGENTS})
     for tool, options in TOOLS.items():
         arguments = [option.format(out=tmp_path) for option in options]
         command = [sys.executable, str(ROOT / f"scripts/{tool}.py"), str(bag), *arguments]
