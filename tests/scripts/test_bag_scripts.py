@@ -105,3 +105,15 @@ def test_analyze_knows_a_bag(bag_3v2: Path, tmp_path: Path) -> None:
     assert told.returncode == 0, told.stderr
     assert told.stdout.startswith("3v2: 4 episodes in")
     assert (tmp_path / "report" / "episodes.csv").is_file()
+
+
+def test_analysing_a_bag_imports_no_statistics_and_no_pandas(bag_3v2: Path, tmp_path: Path) -> None:
+    """They take seconds and 100 MB, and even a file that is refused may take 5 s at most."""
+    words = [str(ROOT / "scripts/analyze.py"), str(bag_3v2), "--out", str(tmp_path / "report")]
+    script = (
+        f"import runpy, sys; sys.argv = {words!r}\n"
+        "try: runpy.run_path(sys.argv[0], run_name='__main__')\n"
+        "except SystemExit as end: print(end.code, {'pandas', 'statsmodels'} & {*sys.modules})"
+    )
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert told.stdout.splitlines()[-1] == "0 set()", told.stderr
