@@ -40,6 +40,7 @@ from keepaway_sim.world.world import World
 
 SCRIPTS = Path(__file__).resolve().parents[1]
 TASK = "3v2"
+MATCH_ID = 7  # that all messages carry, as a simulator's do
 PASS_EVERY = 8  # [cycles]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 CHUNK = 6000  # messages that are written together: a chunk of some 700 KB
@@ -121,7 +122,8 @@ def lengthen(base: Path, path: Path, count: int, episodes: int, disorder: bool) 
     if disorder:
         random.Random(1).shuffle(places)
     with BagWriter(path, reader.info, flush_interval=float("inf"), chunk_size=2**30) as bag:
-        bag.write(match.topic, match.message_type, match.data, match.log_time)
+        told = codec(MATCH).decode(match.data) | {"match_id": MATCH_ID}
+        bag.write(match.topic, MATCH, codec(MATCH).encode(told), match.log_time)
         for number, chunk in places:
             for message in later(chunks[chunk], number * period, number * episodes):
                 bag.write(*message[:2], message.data, message.log_time)
@@ -139,12 +141,15 @@ def chunk_of(said: list[Recorded]) -> Chunk:
         layout = codec(message_type)
         first = said[places[0]].data
         dtype = layout.dtype(layout.lengths(layout.decode(first)), size)
-        raw = np.frombuffer(b"".join(said[at].data for at in places), np.uint8)
+        raw = np.array(bytearray(b"".join(said[at].data for at in places)), np.uint8)
+        raw = raw.reshape(-1, size)
         names = dtype.names or ()
         nanosecs = [name for name in names if name.endswith("nanosec")]
         times = [(f"{name.removesuffix('nanosec')}sec", name) for name in nanosecs]
         episode = next((name for name in ("episode", "number") if name in names), "")
-        alike.append(Alike(np.array(places), dtype, raw.reshape(-1, size), times, episode))
+        if "match_id" in names:
+            raw.view(dtype)[:, 0]["match_id"] = MATCH_ID
+        alike.append(Alike(np.array(places), dtype, raw, times, episode))
     return Chunk(said, alike)
 
 

@@ -54,6 +54,7 @@ class Found:
         episodes: (n,) its Episode messages, each number once, in order.
         repeated: Match and Episode messages that came again.
         strange: messages of matches that the bag does not describe, on this one's topics.
+        mixed: places that have other messages as well.
         counts: its perceptions, states and requests by the topics' names.
         simulated: log times are the messages' own stamps.
         last: the newest field state's episode, cycle, outcome and stamp [ns]; None without one.
@@ -68,6 +69,7 @@ class Found:
     episodes: list[np.void] = field(default_factory=list)
     repeated: int = 0
     strange: int = 0
+    mixed: set[int] = field(default_factory=set)
     counts: Counter[str] = field(default_factory=Counter)
     simulated: bool = True
     last: tuple[int, int, int, int] | None = None
@@ -84,6 +86,8 @@ class Found:
 
     def own(self, number: int, data: bytes, rows: np.ndarray) -> np.ndarray:
         """(n,) bool: which rows of the place with that number are messages of this match."""
+        if number not in self.mixed:
+            return np.ones(len(rows), np.bool_)
         return self.belonging.chosen(self.ids_of(data, rows), number, rows)
 
 
@@ -193,6 +197,7 @@ def _index(reader: BagReader, matches: list[Found]) -> None:
         match.pieces.clear()
         match._ends.clear()
         match.counts.clear()
+        match.mixed.clear()
         match.repeated, match.strange, match.simulated, match.last = 0, 0, True, None
     layouts = [_layouts(reader, match) for match in matches]
     known = np.array([0, *(match.values.get("match_id", 0) for match in matches)], np.uint64)
@@ -202,8 +207,10 @@ def _index(reader: BagReader, matches: list[Found]) -> None:
         strange = int((~np.isin(ids, known)).sum()) if known[1:].all() else 0
         for match, layout in zip(matches, layouts, strict=True):
             match.strange += strange
-            own = found[match.belonging.chosen(ids, at, found)]
-            _index_place(reader, match, layout, (at, place, data, own))
+            own = match.belonging.chosen(ids, at, found)
+            if not own.all():
+                match.mixed.add(at)
+            _index_place(reader, match, layout, (at, place, data, found[own]))
     for match in matches:
         match.episodes = [match._ends[number] for number in sorted(match._ends)]
 
