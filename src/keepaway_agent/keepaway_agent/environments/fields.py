@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.compiled import Kernel
+from keepaway_agent.compiled import Kernel, prepare
 from keepaway_agent.environments.compiled_fields import (
     NO_CHOICE,
     Play,
@@ -21,7 +21,9 @@ from keepaway_agent.environments.refusals import (
     MAX_FIELDS,
     ClosedError,
     ResetNeededError,
+    checked_config,
     checked_number,
+    checked_task,
 )
 from keepaway_agent.environments.snapshots import FieldState, require_kind
 from keepaway_agent.environments.spaces import observation_space
@@ -84,7 +86,7 @@ class DecisionFields:
             AgentError, KeepawayError: settings that make no match.
         """
         self._settings = {name: value for name, value in locals().items() if name != "self"}
-        self.task = _checked_task(task)
+        self.task = checked_task(task)
         self.num_fields = checked_number("num_fields", num_fields, 1, MAX_FIELDS)
         interval = checked_number("decision_interval", decision_interval, 1, 1000)
         n = self.task.num_keepers
@@ -93,7 +95,7 @@ class DecisionFields:
         self._outside[n:] = taker_policy == OUTSIDE
         self._keeper = _rule_player(0, n, keeper_policy, ordering, interval)
         self._taker = _rule_player(n, n, taker_policy, "ball", interval)
-        config = _checked_config(config)
+        config = checked_config(config)
         self._world = World(self.task, config, self.num_fields, is_stepped=False)
         self._is_started, self._is_closed = False, False
         self.watchers: list[Callable[[DecisionFields], None]] = []
@@ -290,6 +292,22 @@ class DecisionFields:
             watch(self)
         return int(num_stopped)
 
+    @property
+    def play_call(self) -> tuple[Kernel, tuple[Any, ...]]:
+        """What `prepare` compiles to play; for an environment that needs no more of this class."""
+        return self._play, (self._plays(self._nowhere, self._nowhere, self._uncounted),)
+
+    def prepare(self) -> None:
+        """Compile all that is called here, side by side, so that no call waits."""
+        who = np.zeros(self.num_fields, np.int64)
+        observing = [
+            (kernel, (who, high, state, np.zeros((self.num_fields, len(high)), np.float32)))
+            for role, kernel in self._observe.items()
+            for high, state in [(self._high[role], self._state[role])]
+        ]
+        choices = np.full(self.choosing.shape, NO_CHOICE)
+        prepare((self._choose_all, (choices,)), self.play_call, *observing)
+
     def observe(self, role: Role, who: np.ndarray, into: np.ndarray) -> None:
         """Write what one player of every field sees.
 
@@ -374,19 +392,3 @@ def _rule_player(index: int, num_keepers: int, policy: Any, ordering: Any, inter
         raise AgentError(f"ordering {ordering!r}: choose ball or k1")
     rule = _STAND_INS[role] if policy == OUTSIDE else policy
     return make_player(index, num_keepers, rule, ordering, interval)
-
-
-def _checked_task(task: Any) -> Task:
-    if isinstance(task, Task):
-        return task
-    if not isinstance(task, str):
-        raise AgentError(f"task={task!r}: write keepers v takers like '3v2', or give a Task")
-    return Task.parse(task)
-
-
-def _checked_config(config: Any) -> Config:
-    if config is None or isinstance(config, Config):
-        return config or Config()
-    raise AgentError(
-        f"config={config!r:.60}: give a keepaway_sim.world.config.Config, as `profile` makes"
-    )

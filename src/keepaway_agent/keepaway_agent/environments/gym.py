@@ -18,7 +18,7 @@ from gymnasium.spaces import Box, Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from keepaway_agent.compiled import Kernel
+from keepaway_agent.compiled import Kernel, prepare
 from keepaway_agent.environments.camera import Camera
 from keepaway_agent.environments.compiled_fields import (
     KeeperBooks,
@@ -105,8 +105,8 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         variables = self.single_observation_space.high
         self._books = _books(self.num_envs)
-        self._lay_kernels()
         self._for_results = self._max_steps, variables, np.zeros(len(variables))
+        self._lay_kernels()
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
         self._masks = dict.fromkeys((f"_{name}" for name in _INFOS), self._all)
@@ -116,6 +116,11 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         deciders, books = self._fields.deciders, self._books
         self._begin_step = Kernel(begin_step, deciders, books)
         self._end_step = Kernel(end_step, deciders, books, self._fields.choosing)
+        prepare(
+            (self._begin_step, (np.zeros(self.num_envs, np.int64),)),
+            (self._end_step, (*self._for_results, self._empty_results())),
+            self._fields.play_call,
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the kernels: they are laid anew around the copied arrays."""
@@ -191,8 +196,15 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def _results(self) -> Results:
         """The results of a step; episodes of the maximum length are truncated."""
+        results = self._empty_results()
+        if self._end_step(*self._for_results, results):
+            self._fields.abort(results.truncated)
+            self._books.choosing[results.truncated] = False
+        return results
+
+    def _empty_results(self) -> Results:
         size = self.num_envs
-        results = Results(
+        return Results(
             np.empty((size, len(self._for_results[1])), dtype=np.float32),
             np.empty(size),
             np.empty(size, dtype=np.bool_),
@@ -202,10 +214,6 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             np.empty(size, dtype=np.int64),
             np.empty(size, dtype=np.int64),
         )
-        if self._end_step(*self._for_results, results):
-            self._fields.abort(results.truncated)
-            self._books.choosing[results.truncated] = False
-        return results
 
     def get_state(self) -> list[KeeperState]:
         """The state of every field now, as copies: plain data for `set_state`.

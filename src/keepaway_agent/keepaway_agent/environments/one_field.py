@@ -49,6 +49,7 @@ class OneField:
             raise AgentError(f"teams={teams!r}: choose one of {', '.join(TEAMS)}")
         self.render_mode = checked_mode(render_mode, self.RENDER_MODES)
         self.fields = DecisionFields(num_fields=1, **_completed(teams, settings))
+        self.fields.prepare()
         self.camera = Camera(self.fields, self.render_mode)
         task = self.fields.task
         n = task.num_keepers

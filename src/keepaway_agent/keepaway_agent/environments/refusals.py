@@ -12,6 +12,8 @@ import gymnasium.error
 import numpy as np
 
 from keepaway_agent.errors import AgentError
+from keepaway_sim.task import Task
+from keepaway_sim.world.config import Config
 
 MAX_FIELDS: Final = 4096
 """Fields side by side; more need more memory than they save time."""
@@ -109,6 +111,32 @@ def checked_mode(render_mode: Any, known: list[str]) -> str | None:
         return render_mode
     raise UnsupportedModeError(
         f"render_mode={render_mode!r}: choose None or one of {', '.join(known)}"
+    )
+
+
+def checked_task(task: Any) -> Task:
+    """A task by its name, or as it is.
+
+    Raises:
+        AgentError, KeepawayError: no task.
+    """
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str):
+        raise AgentError(f"task={task!r}: write keepers v takers like '3v2', or give a Task")
+    return Task.parse(task)
+
+
+def checked_config(config: Any) -> Config:
+    """A configuration of the world; None is the default one.
+
+    Raises:
+        AgentError: something else.
+    """
+    if config is None or isinstance(config, Config):
+        return config or Config()
+    raise AgentError(
+        f"config={config!r:.60}: give a keepaway_sim.world.config.Config, as `profile` makes"
     )
 
 
