@@ -6,6 +6,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import api_test, seed_test
 
+from keepaway_agent import compiled
+from keepaway_agent.environments import keepaway_v0
 from keepaway_agent.environments.aec import KeepawayAECEnv
 from keepaway_agent.environments.gym import KeeperEnv, KeeperVectorEnv
 from keepaway_agent.errors import AgentError
@@ -113,3 +115,15 @@ def test_it_is_made_by_its_name_alone_and_by_the_dozen() -> None:
 def test_settings_that_make_no_game_are_refused() -> None:
     with pytest.raises(AgentError, match="taker policy 'nice'"):
         KeeperEnv(taker_policy="nice")
+
+
+def test_no_step_of_an_environment_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    many = KeeperVectorEnv(2)
+    at_once, in_turn = keepaway_v0.parallel_env(), keepaway_v0.turn_based_env(teams="both")
+    monkeypatch.setattr(compiled, "make", lambda jobs: pytest.fail(f"compiles {jobs}"))
+    many.reset(seed=1)
+    many.step(many.action_space.sample())
+    at_once.reset(seed=1)
+    at_once.step(dict.fromkeys(at_once.agents, at_once.nothing))
+    in_turn.reset(seed=1)
+    in_turn.step(0)
