@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from keepaway_msgs.msg import Episode
 from keepaway_sim.nodes.scoreboard import Scoreboard
@@ -50,6 +51,25 @@ def test_a_terminal_gets_one_bar(context: rclpy.Context) -> None:
     assert "3/4" in last
     assert "last 3 held 5.00 s" in last
     assert out.getvalue().count("\n") == 1
+
+
+def test_what_others_publish_in_a_matchs_name_is_shown_as_plain_text(
+    context: rclpy.Context,
+) -> None:
+    out = io.StringIO()
+    board = Scoreboard(1, out=out, context=context, match_id=7)
+    odd = [KeyValue(key="late", value=text) for text in ("2", "\x1b[31m", "1e9", "9" * 5000)]
+    pace = [KeyValue(key="cycles_per_second", value="\x1b[2J")]
+    status = [
+        DiagnosticStatus(name="/simulator", hardware_id="7", message="\x1b[31m\n", values=pace),
+        DiagnosticStatus(name="/keeper_1", hardware_id="7", values=odd[1:] + odd[:1]),
+    ]
+    board._on_diagnostics(DiagnosticArray(status=status))
+    assert board.troubles == {"keeper_1": {"late": 2}}
+    board._on_episode(Episode(match_id=7, cycles=50, duration=5.0, outcome=Outcome.TAKEN_AWAY))
+    board.conclude()
+    assert all(line.isprintable() for line in out.getvalue().splitlines())
+    assert "\\x1b[2J cycles/s" in out.getvalue()
 
 
 def test_nothing_is_shown_before_an_episode_has_ended(context: rclpy.Context) -> None:

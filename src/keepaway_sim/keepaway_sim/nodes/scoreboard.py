@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from typing import Any, TextIO
@@ -20,6 +21,7 @@ TERMINAL_PERIOD, FILE_PERIOD = 0.5, 10.0
 """[s] between two reports."""
 RECENT = 20
 """Episodes of the mean that is shown."""
+_COUNT = re.compile(r"[0-9]{1,18}")
 
 
 def score(episode: Episode) -> Score:
@@ -150,9 +152,10 @@ class Scoreboard(Node):
         for status in message.status:
             if not status.name.startswith(prefix) or status.hardware_id != str(self.match_id):
                 continue
-            values = {entry.key: entry.value for entry in status.values}
+            values = {entry.key: one_line(entry.value) for entry in status.values}
             name = status.name.removeprefix(prefix)
             if name == "simulator":
                 self.state, self.figures = one_line(status.message), values
             else:
-                self.troubles[name] = {key: int(value) for key, value in values.items()}
+                counts = {key: value for key, value in values.items() if _COUNT.fullmatch(value)}
+                self.troubles[name] = {key: int(value) for key, value in counts.items()}
