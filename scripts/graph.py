@@ -49,25 +49,25 @@ def discover(node: Node, quiet: float) -> None:
     found, since = -1, time.monotonic()
     while time.monotonic() - since < quiet:
         names, topics = node.get_node_names_and_namespaces(), node.get_topic_names_and_types()
-        talk = sum(node.count_publishers(t) + node.count_subscribers(t) for t, _ in topics)
-        if len(names) + talk != found:
-            found, since = len(names) + talk, time.monotonic()
+        ends = sum(node.count_publishers(t) + node.count_subscribers(t) for t, _ in topics)
+        if len(names) + ends != found:
+            found, since = len(names) + ends, time.monotonic()
         time.sleep(0.1)
 
 
 def print_graph(node: Node, show_all: bool) -> None:
-    """Nodes; topics with their types and how many talk and listen; services."""
+    """Nodes; topics with their types and the number of publishers and subscribers; services."""
     print("Nodes")
     own = node.get_fully_qualified_name()
     for name, namespace in sorted(node.get_node_names_and_namespaces()):
         full = f"{namespace.rstrip('/')}/{name}"
         if full != own:
             print(f"  {full}")
-    print("Topics, talkers -> listeners")
+    print("Topics, publishers -> subscribers")
     for topic, types in sorted(node.get_topic_names_and_types()):
         if show_all or topic not in HIDDEN:
-            talkers, listeners = node.count_publishers(topic), node.count_subscribers(topic)
-            print(f"  {topic}  {', '.join(types)}  {talkers} -> {listeners}")
+            publishers, subscribers = node.count_publishers(topic), node.count_subscribers(topic)
+            print(f"  {topic}  {', '.join(types)}  {publishers} -> {subscribers}")
     print("Services")
     for service, types in sorted(node.get_service_names_and_types()):
         if show_all or not types[0].startswith(OWN_SERVICES):
@@ -77,11 +77,11 @@ def print_graph(node: Node, show_all: bool) -> None:
 def echo(node: Node, topic: str, count: int) -> int:
     """Print a topic's next messages, or its latched one."""
     types = dict(node.get_topic_names_and_types()).get(topic)
-    talkers = node.get_publishers_info_by_topic(topic)
-    if not types or not talkers:
-        print(f"graph: nobody publishes on {topic}", file=sys.stderr)
+    publishers = node.get_publishers_info_by_topic(topic)
+    if not types or not publishers:
+        print(f"graph: no node publishes {topic}", file=sys.stderr)
         return 1
-    latched = talkers[0].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    latched = publishers[0].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     qos = QoSProfile(
         depth=10,
         reliability=ReliabilityPolicy.RELIABLE if latched else ReliabilityPolicy.BEST_EFFORT,

@@ -330,7 +330,7 @@ def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
         summary = {**summary, "sem_duration_s": None}
     mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))
     if mean is not None:
-        unknown = " (if nobody learns)" if args.agent else ""
+        unknown = " (if no player learns)" if args.agent else ""
         spread = "" if sem is None else f" +- {sem:.2f}{unknown}"
         print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
     if args.json:
@@ -359,7 +359,7 @@ def parse() -> argparse.Namespace:
     add("--single-process", action="store_true", help="all nodes in this process: quicker")
     add("--namespace", default="", help="of all nodes and topics, like /match_2")
     add("--domain", type=int, help="ROS domain (default: that of the environment)")
-    add("--verbose", action="store_true", help="let the nodes tell what they do")
+    add("--verbose", action="store_true", help="show what the nodes log")
     add("--json", action="store_true", help="end with one JSON object")
     return parser.parse_args()
 

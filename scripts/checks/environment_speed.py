@@ -32,7 +32,7 @@ Play = Callable[[int], int]
 
 
 def trainer(num_fields: int, policy: str = "random") -> Play:
-    """The trainer's own loop, nobody learning."""
+    """The trainer's own loop, without learning."""
     own, seeds = Trainer(TrainerConfig(), num_fields), iter(range(10**9))
 
     def play(cycles: int) -> int:

@@ -187,7 +187,7 @@ def wait_for_players(env: Mapping[str, str], folder: Path, namespace: str = "") 
     while time.monotonic() < until:
         if shell(command, folder, env, timeout=20.0).returncode == 0:
             return
-    raise ToolsError(f"nobody plays after {PATIENCE:.0f} s")
+    raise ToolsError(f"no match plays after {PATIENCE:.0f} s")
 
 
 def shell(

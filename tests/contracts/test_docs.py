@@ -112,7 +112,7 @@ def test_a_tutorial_runs_as_written(tutorial: str, tmp_path: Path, ros_domain: i
     for name in ("scripts", "src", ".venv"):
         (tmp_path / name).symlink_to(ROOT / name)
     blocks = re.findall(r"^```sh\n(.*?)^```", (ROOT / tutorial).read_text(), re.M | re.S)
-    assert len(blocks) >= 3
+    assert len(blocks) >= 2  # those marked sh: the quick ones
     environment = os.environ | {"ROS_DOMAIN_ID": str(ros_domain)}
     for block in blocks:
         done = subprocess.run(

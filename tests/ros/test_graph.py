@@ -57,4 +57,4 @@ def test_it_prints_what_is_latched(domain: int) -> None:
 def test_a_topic_that_nobody_publishes_is_refused_in_a_line(ros_domain: int) -> None:
     done = graph(ros_domain, "--topic", "/words")
     assert done.returncode == 1
-    assert done.stderr == "graph: nobody publishes on /words\n"
+    assert done.stderr == "graph: no node publishes /words\n"

@@ -52,7 +52,7 @@ class LearnedWeights:
     """The weights of one player and what they mean.
 
     Raises:
-        WeightsError: weights that do not fit what is said about them, or of a size that nobody
+        WeightsError: weights that do not fit their description, or of a size that no player
             learns; a number or text outside its range.
     """
 

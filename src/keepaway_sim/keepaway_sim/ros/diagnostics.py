@@ -50,7 +50,7 @@ class Troubles:
     """Who had trouble lately: a player's status recovers once nothing new is counted."""
 
     def __init__(self) -> None:
-        """Nobody yet."""
+        """No player yet."""
         self._seen: dict[str, tuple[dict[str, int], float]] = {}  # counts, and since when
 
     def player_statuses(
