@@ -125,8 +125,11 @@ def draw_band(ours: np.ndarray) -> Figure:
     axes = figure.subplots()
     episodes = POINT * (np.arange(ours.shape[1]) + 1)
     mean, spread = ours.mean(axis=0), 2.0 * ours.std(axis=0, ddof=1)
-    axes.fill_between(episodes, mean - spread, mean + spread, color=OURS, alpha=0.2, linewidth=0)
-    axes.plot(episodes, mean, color=OURS, linewidth=2.2, label=f"here, {len(ours)} trials")
+    axes.fill_between(
+        episodes, mean - spread, mean + spread, color=OURS, alpha=0.2, linewidth=0,
+        label="here, ± 2 sd of trials",
+    )  # fmt: skip
+    axes.plot(episodes, mean, color=OURS, linewidth=2.2, label=f"here, mean of {len(ours)} trials")
     for number, theirs in enumerate(reference_curves("2005")):
         axes.plot(
             POINT * (np.arange(len(theirs)) + 1), theirs, "o-", color=REFERENCE, markersize=3,

@@ -16,6 +16,10 @@ from keepaway_agent.fidelity.reference import reference, reference_curves
 
 STAGES: Final = ("episodes_0_200", "episodes_2800_3000", "episodes_5285_5485")
 """Names of the reference's stages of learning, in order."""
+FIRST_BLOCK: Final = 2
+"""Blocks of POINT episodes before the band counts: they depend on who wins the first ties."""
+LONG_BLOCK: Final = 3
+"""Blocks of POINT episodes that are compared with the longest run together."""
 INTRODUCTION: Final = """# How near the world is to the real one
 
 Everything here was measured by `scripts/checks/fidelity.py --page` and compared with the RoboCup
@@ -105,11 +109,43 @@ def _learned(learned: Mapping[str, Any]) -> list[str]:
         f"Means of {POINT} episodes of 3v2 (s), {len(durations)} trials here.\n",
         "![learning](learned.png)\n",
         table(header[: 2 + len(curves)], rows),
+        _nearness(mean, spread, curves),
         _behaviour(learned["stages"]),
+        _holding(learned["stages"][-1]),
         _beliefs(learned["belief_errors"]),
         "How learned keepers play, means of an episode:\n",
         _processes(learned["processes"]),
     ]
+
+
+def _nearness(mean: np.ndarray, spread: np.ndarray, curves: Sequence[np.ndarray]) -> str:
+    """How many blocks of the real runs lie in the band, and our mean over the longest run's."""
+    counts = []
+    for curve in curves:
+        n = min(len(curve), len(mean))
+        inside = np.abs(curve[:n] - mean[:n]) <= 2.0 * spread[:n]
+        counts.append((int(inside[FIRST_BLOCK:].sum()), max(n - FIRST_BLOCK, 0)))
+    each = ", ".join(f"{inside} of {of}" for inside, of in counts)
+    longest = max(curves, key=len)
+    n = min(len(longest), len(mean)) // LONG_BLOCK * LONG_BLOCK
+    ours, theirs = (x[:n].reshape(-1, LONG_BLOCK).mean(axis=1) for x in (mean, longest))
+    ratios = ", ".join(f"{ratio:.2f}" for ratio in ours / theirs)
+    return (
+        f"From episode {POINT * FIRST_BLOCK} on {each} blocks of the real runs lie inside mean ± 2"
+        f" sd. Our mean over the longest run's, by {POINT * LONG_BLOCK} episodes: {ratios}.\n"
+    )
+
+
+def _holding(stage: Mapping[str, Any]) -> str:
+    """Share of holding by the distance at which the nearest taker is believed."""
+    ours = stage["hold_share_by_distance_to_T1_m"]
+    theirs = reference("hold_times")["E05"]["learned_3v2"]["hold_share_by_distance_to_T1_m"]
+    names = [name for name in ours if name in theirs]
+    rows = [
+        [f"here, from episode {stage['begin']}", *(f"{ours[name]:.2f}" for name in names)],
+        ["real server", *(f"{theirs[name]:.2f}" for name in names)],
+    ]
+    return table(["share of holding, T1 at (m)", *names], rows)
 
 
 def _behaviour(stages: Sequence[Mapping[str, Any]]) -> str:
