@@ -13,10 +13,13 @@ Ctrl-C ends it with weights and bag whole. Give a second match on this machine a
 import argparse
 import itertools
 import json
+import multiprocessing
 import os
 import shlex
 import sys
 import time
+from functools import partial
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,14 +30,17 @@ from rclpy.signals import SignalHandlerOptions
 
 from keepaway_agent.actions import Role
 from keepaway_agent.errors import AgentError
+from keepaway_agent.nodes import keeper, taker
 from keepaway_agent.nodes.player import PlayerNode
 from keepaway_agent.playing.policies import KEEPER_POLICIES, TAKER_POLICIES
+from keepaway_agent.training.ahead import load_for_match
 from keepaway_sim.cli.interrupts import SIGNALS
 from keepaway_sim.cli.options import add_options, ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.beginning import random_match_id
 from keepaway_sim.match.settings import MatchSettings, named_texts
+from keepaway_sim.nodes import simulator
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
 from keepaway_sim.ros.running import ignore_signals, received_signals
@@ -51,6 +57,7 @@ MATCH_OPTIONS = (
     *("record", "wait_for_recorder", "force"),
 )
 WORLD_OPTIONS = ("profile", "visible_angle_deg")
+MAINS = {"simulator": simulator.main, "keeper": keeper.main, "taker": taker.main}
 MOST_UNHEARD = 1000  # messages that may still wait to be taken in at the end
 
 
@@ -62,8 +69,10 @@ class Member(NamedTuple):
     """One node of a match."""
 
     name: str
-    program: str  # simulator, keeper or taker
+    kind: str  # simulator, keeper or taker
+    program: list[str]  # the command that starts it, without arguments
     arguments: list[str]  # ROS's
+    is_ours: bool
 
 
 def main() -> int:
@@ -72,17 +81,13 @@ def main() -> int:
     signals = received_signals(SIGNALS)
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)
-    rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
-    executor = EventsExecutor()
     try:
         task = Task.parse(args.task, args.field)
         seat_agents(args, task)
         check_files(args)
         args.match_id = random_match_id()
-        board = Scoreboard(args.episodes, args.match_id, namespace=args.namespace)
-        executor.add_node(board)
         play = play_in_one_process if args.single_process else play_in_processes
-        play(args, members(args, task), board, executor, signals)
+        board = play(args, members(args, task), signals)
     except (AgentError, KeepawayError, MatchError, OSError) as error:
         print(f"match: {error}", file=sys.stderr)
         return 1
@@ -136,13 +141,15 @@ def members(args: argparse.Namespace, task: Task) -> list[Member]:
     info = {"command": shlex.join(sys.argv), "agents": json.dumps(agents, allow_nan=False)}
     settings["record_info"] = named_texts(info)
     settings["record_attachments"] = named_texts(weights_at_start(players))
-    return [
-        Member("simulator", "simulator", arguments_of("simulator", args, settings)),
-        *(
-            Member(name, task.role(p).name.lower(), arguments_of(name, args, players[name]))
-            for p, name in enumerate(task.player_names)
-        ),
-    ]
+    kinds = {"simulator": "simulator"} | {
+        name: task.role(p).name.lower() for p, name in enumerate(task.player_names)
+    }
+    team = []
+    for name in [name for name in kinds if name not in args.elsewhere]:
+        start, arguments = program(args, name, kinds[name]), players.get(name, settings)
+        made = arguments_of(name, args, arguments)
+        team.append(Member(name, kinds[name], start, made, name not in args.agent))
+    return team
 
 
 def player_settings(args: argparse.Namespace, name: str, role: TaskRole) -> dict[str, object]:
@@ -207,21 +214,27 @@ def check_files(args: argparse.Namespace) -> None:
         )
 
 
+def begin_ros(args: argparse.Namespace) -> tuple[Scoreboard, Executor]:
+    """The node of this process, and what spins it."""
+    rclpy.init(args=log_level(args), signal_handler_options=SignalHandlerOptions.NO)
+    board = Scoreboard(args.episodes, args.match_id, namespace=args.namespace)
+    executor = EventsExecutor()
+    executor.add_node(board)
+    return board, executor
+
+
 def play_in_one_process(
-    args: argparse.Namespace,
-    team: list[Member],
-    board: Scoreboard,
-    executor: Executor,
-    signals: list[int],
-) -> None:
+    args: argparse.Namespace, team: list[Member], signals: list[int]
+) -> Scoreboard:
     """All nodes here, taking turns."""
+    board, executor = begin_ros(args)
     options = [{"cli_args": each.arguments, "use_global_arguments": False} for each in team]
-    simulator = Simulator(**options[0])
+    referee = Simulator(**options[0])
     players = [
-        PlayerNode(Role[each.program.upper()], **option)
+        PlayerNode(Role[each.kind.upper()], **option)
         for each, option in zip(team[1:], options[1:], strict=True)
     ]
-    for node in (simulator, *players):
+    for node in (referee, *players):
         executor.add_node(node)
 
     def spin(timeout: float) -> None:
@@ -229,29 +242,23 @@ def play_in_one_process(
         board.show()
 
     try:
-        simulator.play(spin, lambda: bool(signals))
+        referee.play(spin, lambda: bool(signals))
     finally:
-        simulator.close()
+        referee.close()
         for player in players:
             player.save()
+    return board
 
 
 def play_in_processes(
-    args: argparse.Namespace,
-    team: list[Member],
-    board: Scoreboard,
-    executor: Executor,
-    signals: list[int],
-) -> None:
+    args: argparse.Namespace, team: list[Member], signals: list[int]
+) -> Scoreboard:
     """Every node its own process; ends when the simulator's does."""
     with Processes(os.environ) as processes:
-        commands = {
-            each.name: [*program(args, each), *each.arguments]
-            for each in team
-            if each.name not in args.elsewhere
-        }
-        for name, command in commands.items():
-            processes.start(name, command)
+        commands = {each.name: [*each.program, *each.arguments] for each in team}
+        is_counted = start(team, processes)
+        board, executor = begin_ros(args)
+        is_counted.set()
         until = time.monotonic() + COMPILE_TIMEOUT
         is_found = False
         while not signals and "simulator" in processes.names:
@@ -270,6 +277,31 @@ def play_in_processes(
         for name in processes.stop(processes.names, END_TIMEOUT):
             print(f"match: {name} did not end and was killed", file=sys.stderr)
     hear_all(executor)
+    return board
+
+
+def start(team: list[Member], processes: Processes) -> Event:
+    """Start all nodes; the simulator waits for the event, that its episodes are counted here.
+
+    Ours are split off this process before it uses ROS, as all of them would import and load the
+    same again, which takes longer than all else at a match's start.
+    """
+    load_for_match()
+    is_counted = multiprocessing.get_context("fork").Event()
+    for each in team:
+        command = [*each.program, *each.arguments]
+        if each.is_ours:
+            processes.split_off(each.name, command, partial(run_member, each, is_counted))
+        else:
+            processes.start(each.name, command)
+    return is_counted
+
+
+def run_member(member: Member, is_counted: Event) -> None:
+    """Run a node of ours in this process until it ends."""
+    if member.kind == "simulator":
+        is_counted.wait()
+    MAINS[member.kind](member.arguments)
 
 
 def hear_all(executor: Executor) -> None:
@@ -313,19 +345,15 @@ def free_folder(record: str) -> str:
     return next(folder for folder in numbered if not Path(folder).exists()) if record else ""
 
 
-def program(args: argparse.Namespace, member: Member) -> list[str]:
-    """The command that starts a node."""
-    if member.name not in args.agent:
-        return [sys.executable, str(SCRIPTS / f"{member.program}.py")]
-    return script_command(shlex.split(args.agent[member.name]))
+def program(args: argparse.Namespace, name: str, kind: str) -> list[str]:
+    """The command that starts a node, without arguments."""
+    if name not in args.agent:
+        return [sys.executable, str(SCRIPTS / f"{kind}.py")]
+    return script_command(shlex.split(args.agent[name]))
 
 
 def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
-    """Say how it went.
-
-    A match is one trial: episodes of players that learn in it depend on each other, so there is no
-    error to tell. Of agents from elsewhere it is not known whether they learn.
-    """
+    """Say how it went; without an error where somebody learns, as a match is one trial."""
     if "learn" in (args.keeper_policy, args.taker_policy):
         summary = {**summary, "sem_duration_s": None}
     mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))

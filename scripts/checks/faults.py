@@ -18,6 +18,7 @@ import argparse
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -111,9 +112,9 @@ class Match:
         pid, found = self._process.pid, {}
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
             with contextlib.suppress(OSError):  # it has just ended
-                for word in Path(f"/proc/{child}/cmdline").read_text().split("\0"):
-                    if word.startswith("__node:="):
-                        found[word.removeprefix("__node:=")] = int(child)
+                command = Path(f"/proc/{child}/cmdline").read_text()
+                if name := re.search(r"__node:=(\w+)", command):
+                    found[name[1]] = int(child)
         return found
 
     def check_weights(self) -> None:

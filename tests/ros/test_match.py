@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -51,9 +52,8 @@ def nodes_of(match: "subprocess.Popen[str]") -> dict[str, int]:
     """The ids of the processes it started, by node name."""
     found = {}
     for child in Path(f"/proc/{match.pid}/task/{match.pid}/children").read_text().split():
-        for word in Path(f"/proc/{child}/cmdline").read_text().split("\0"):
-            if word.startswith("__node:="):
-                found[word.removeprefix("__node:=")] = int(child)
+        if name := re.search(r"__node:=(\w+)", Path(f"/proc/{child}/cmdline").read_text()):
+            found[name[1]] = int(child)
     return found
 
 
@@ -112,6 +112,7 @@ def test_a_player_that_is_killed_is_named_and_the_match_goes_on() -> None:
     line = match.stderr.readline()
     while "episodes" not in line:
         line = match.stderr.readline()
+        assert line, "it has ended"
     os.kill(nodes_of(match)["keeper_2"], signal.SIGKILL)
     summary, err = finish(match)
     assert match.returncode == 0

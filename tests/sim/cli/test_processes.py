@@ -1,6 +1,7 @@
 """Processes that are started, watched and ended together."""
 
 import os
+import subprocess
 import sys
 import time
 
@@ -99,3 +100,88 @@ def test_children_end_with_a_parent_that_is_killed(tmp_path):
         assert wait_for_end(processes) == [Ended("parent", -9)]
         child = int((tmp_path / "pid").read_text())
         wait_until(lambda: not is_alive(child))
+
+
+def in_a_process_without_threads(body, *arguments):
+    """What `body` prints; it has `Processes`, and `wait` for something that it is given."""
+    code = "\n".join(
+        [
+            "import os, pathlib, signal, sys, threading, time, psutil",
+            "from keepaway_sim.cli.processes import Processes",
+            "from keepaway_sim.errors import KeepawayError",
+            "path = pathlib.Path(sys.argv[1])",
+            "def wait(is_so):",
+            "    while not is_so():",
+            "        time.sleep(0.01)",
+            body,
+        ]
+    )
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.stderr == ""
+    return done.stdout
+
+
+def test_one_that_was_split_off_is_known_by_its_command_and_ends_with_its_code(tmp_path):
+    said = in_a_process_without_threads(
+        """
+def run():
+    path.write_text(f"{sys.argv} {os.environ['WHO']} {os.getsid(0) == os.getpid()}")
+    wait(lambda: not path.exists())
+    raise SystemExit(4)
+with Processes({**os.environ, "WHO": "me"}) as processes:
+    processes.split_off("a", [sys.executable, "script.py", "--loud"], run)
+    wait(lambda: path.exists() and path.read_text())
+    print(path.read_text())
+    print("script.py --loud" in " ".join(psutil.Process(processes.pid("a")).cmdline()))
+    path.unlink()
+    wait(lambda: not processes.is_running("a"))
+    print(processes.ended()[0].code)
+""",
+        tmp_path / "said.txt",
+    )
+    assert said.splitlines() == ["['script.py', '--loud'] me True", "True", "4"]
+
+
+def test_one_that_was_split_off_does_not_have_its_starters_handlers(tmp_path):
+    said = in_a_process_without_threads(
+        """
+signal.signal(signal.SIGTERM, lambda *_: print("the starter's"))
+with Processes(os.environ) as processes:
+    processes.split_off("a", [sys.executable], lambda: (path.touch(), time.sleep(60)))
+    wait(path.exists)
+    print(processes.end("a", patience=60) == -signal.SIGTERM)
+""",
+        tmp_path / "begun",
+    )
+    assert said == "True\n"
+
+
+def test_one_that_was_split_off_ends_with_its_starter(tmp_path):
+    said = in_a_process_without_threads(
+        """
+processes = Processes(os.environ)
+processes.split_off("a", [sys.executable], lambda: (path.touch(), time.sleep(60)))
+wait(path.exists)
+print(processes.pid("a"), flush=True)
+os._exit(0)
+""",
+        tmp_path / "begun",
+    )
+    wait_until(lambda: not is_alive(int(said)))
+
+
+def test_a_process_with_threads_is_not_split(tmp_path):
+    said = in_a_process_without_threads(
+        """
+done = threading.Event()
+threading.Thread(target=done.wait).start()
+try:
+    Processes(os.environ).split_off("a", [sys.executable], print)
+except KeepawayError as error:
+    print(error)
+done.set()
+""",
+        tmp_path,
+    )
+    assert said == "a: a process with threads cannot be split\n"
