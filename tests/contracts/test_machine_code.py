@@ -196,6 +196,18 @@ def test_all_that_ends_up_in_machine_code_is_counted_among_its_sources() -> None
     assert not {str(module) for module in needed - counted}
 
 
+def test_set_up_compiles_again_when_any_source_has_changed() -> None:
+    root = SRC.parent
+    lines = (root / "scripts/setup").read_text().splitlines()
+    listed = [line for line in lines if line.startswith(("sim=", "compiled"))]
+    script = "\n".join([*listed, 'printf "%s\\n" "${compiled[@]}"'])
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    watched = [root / line for line in done.stdout.splitlines()]
+    assert len(watched) > 5
+    missing = [s for s in sources() if not any(s == w or w in s.parents for w in watched)]
+    assert missing == []
+
+
 def test_every_source_is_there() -> None:
     found = [SIM / name for name in SOURCES] + [AGENT / name for name in SOURCES]
     assert {path.name for path in found if path.exists()} == {Path(name).name for name in SOURCES}
