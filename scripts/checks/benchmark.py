@@ -1,11 +1,13 @@
 """Measure speeds, all in one run, because ratios outlive the machine they were measured on.
 
-    .venv/bin/python scripts/benchmark.py
-    .venv/bin/python scripts/benchmark.py --only world --json
+    .venv/bin/python scripts/checks/benchmark.py
+    .venv/bin/python scripts/checks/benchmark.py --only world --json
+    .venv/bin/python scripts/checks/benchmark.py --runs 3 --write     # the performance page
 
 In process, on one core, in CPU time: the bare pymunk floor (write, step and read the bodies of as
-many fields), the World without and with learning, compiling, two processes against one. Over ROS,
-in wall time: a bare ping-pong of a match's messages between as many processes, and matches.
+many fields), the World without and with learning, environments, two processes against one. In wall
+time: compiling, the start of a match, a study; over ROS a bare ping-pong of a match's messages
+between as many processes, and matches.
 """
 
 from __future__ import annotations
@@ -19,43 +21,57 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pymunk
 import pymunk.batch
+from benchmark_ros import first_cycle, measure_ros
+from performance_page import keep
+
+from keepaway_sim.version import code_version
 
 HERE = Path(__file__).resolve().parent
 SCRIPTS = HERE.parent
-PARTS = ("world", "compile", "processes", "ros")
-DOMAIN = 93  # of the ROS part, so that it receives no match
+PARTS = ("world", "vector", "processes", "starts", "study", "ros")
+STUDY_TRIALS, STUDY_HOURS = 64, 0.5
 
 
 def main() -> int:
-    """Measure what was asked for and print a table, or one JSON object."""
+    """Measure what was asked for and print a table or JSON objects, or write the page."""
     args = parse()
+    runs = [measure(args) for _ in range(args.runs)]
+    for figures in runs:
+        print(
+            json.dumps({k: round(v, 3) for k, v in figures.items()}, allow_nan=False)
+            if args.json
+            else table(figures)
+        )
+    if args.write:
+        keep(runs, "scripts/checks/benchmark.py " + " ".join(sys.argv[1:]), code_version())
+    return 0
+
+
+def measure(args: argparse.Namespace) -> dict[str, float]:
+    """One run of all parts that are asked for."""
     figures: dict[str, float] = {}
     measures: dict[str, Callable[[argparse.Namespace], dict[str, float]]] = {
         "world": measure_world,
-        "compile": measure_compile,
+        "vector": measure_vector,
         "processes": measure_processes,
+        "starts": measure_starts,
+        "study": measure_study,
         "ros": measure_ros,
     }
     for part in args.only or PARTS:
         if not args.json:
             print(f"measures {part} ..", flush=True)
         figures |= measures[part](args)
-    children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    figures["peak_rss_mb"] = max(own, children) / 1024.0
-    print(
-        json.dumps({k: round(v, 3) for k, v in figures.items()}, allow_nan=False)
-        if args.json
-        else table(figures)
-    )
-    return 0
+    if "world" in (args.only or PARTS):
+        figures["peak_rss_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return figures
 
 
 def parse() -> argparse.Namespace:
@@ -65,7 +81,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--fields", type=int, default=128, help="side by side (default 128)")
     parser.add_argument("--cycles", type=int, default=2000, help="of a measurement (default 2000)")
     parser.add_argument("--episodes", type=int, default=60, help="of a match (default 60)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--runs", type=int, default=1, help="of all of it (default 1)")
+    parser.add_argument("--json", action="store_true", help="print a JSON object for each run")
+    parser.add_argument("--write", action="store_true", help="write the performance page")
     return parser.parse_args()
 
 
@@ -183,12 +201,25 @@ def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
     return {f"{task}_{phase}_us": time * 1e6 / played for phase, time in spent.items()}
 
 
-def measure_compile(_: argparse.Namespace) -> dict[str, float]:
-    """Seconds until a first short training has finished, machine code cached or not."""
-    command = [sys.executable, __file__, "--only", "world", "--cycles", "10", "--json"]
+def measure_vector(args: argparse.Namespace) -> dict[str, float]:
+    """Cycles a CPU second of a vector environment beside the trainer's, in turns."""
+    from environment_speed import measure as in_turns
+    from environment_speed import trainer, vector
+
+    plays = {
+        "trainer": lambda: trainer(args.fields),
+        "vector": lambda: vector(args.fields, "all"),
+    }
+    speeds = in_turns(plays, cycles=args.cycles // 4, rounds=5)
+    return {"vector_share": speeds["vector"] / speeds["trainer"]}
+
+
+def measure_starts(args: argparse.Namespace) -> dict[str, float]:
+    """Seconds to the end of a first short training, machine code on disk or not; to a match."""
     code = (
         "import time; start = time.monotonic()\n"
-        "from keepaway_agent.training.trainer import *\n"
+        "from keepaway_agent.training.trainer import Trainer\n"
+        "from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed\n"
         "trainer = Trainer(TrainerConfig(), 1)\n"
         "list(trainer.run([Trial(trial_seed(0, 0), StopRule(max_episodes=1))]))\n"
         "print(time.monotonic() - start)"
@@ -200,7 +231,35 @@ def measure_compile(_: argparse.Namespace) -> dict[str, float]:
             command = [sys.executable, "-c", code]
             done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
             figures[name] = float(done.stdout)
-    return figures
+    return {**figures, "first_cycle_s": first_cycle()}
+
+
+def measure_study(_: argparse.Namespace) -> dict[str, float]:
+    """Hours of play a minute of a row of a study, by one worker, its start included."""
+    settings = {
+        "name": "benchmark",
+        "target": "4v3",
+        "threshold": 99.0,
+        "window": 1000,
+        "trials": STUDY_TRIALS,
+        "max_hours": STUDY_HOURS,
+        "greedy_episodes": 0,
+        "seed": 1,
+    }
+    lines = [f"{name} = {json.dumps(value)}" for name, value in settings.items()]
+    with tempfile.TemporaryDirectory() as folder:
+        study = Path(folder) / "benchmark.toml"
+        study.write_text("\n".join([*lines, 'rows = [{ name = "scratch" }]']))
+        command = [sys.executable, str(SCRIPTS / "study.py"), str(study)]
+        start = time.monotonic()
+        subprocess.run(
+            [*command, "--workers", "1", "--out", str(Path(folder) / "out")],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            check=True,
+        )
+        minutes = (time.monotonic() - start) / 60.0
+    return {"study_hours_a_minute": STUDY_TRIALS * STUDY_HOURS / minutes}
 
 
 def measure_processes(args: argparse.Namespace) -> dict[str, float]:
@@ -229,119 +288,6 @@ def measure_processes(args: argparse.Namespace) -> dict[str, float]:
     together = wall(2)
     alone.append(wall(1))
     return {"two_process_speedup": 2.0 * float(np.mean(alone)) / together}
-
-
-# ---------------------------------------------------------------- over ROS
-
-
-def measure_ros(args: argparse.Namespace) -> dict[str, float]:
-    """Cycles a second (wall time) of a ping-pong of a match's messages, and of matches."""
-    os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
-    figures = {"ros_floor_cps": ping_pong(num_players=5, cycles=3000)}
-    with tempfile.TemporaryDirectory() as folder:
-        recorder = [sys.executable, str(SCRIPTS / "record.py"), str(Path(folder) / "recorded")]
-        figures["ros_match_cps"] = match(args.episodes)
-        figures["ros_bag_cps"] = match(args.episodes, "--record", str(Path(folder) / "bag"))
-        beside = subprocess.Popen(recorder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            figures["ros_recorded_cps"] = match(args.episodes)
-        finally:
-            beside.terminate()
-            beside.wait(60)
-        figures["ros_single_process_cps"] = match(args.episodes, "--single-process")
-    return figures
-
-
-def match(episodes: int, *options: str) -> float:
-    """Cycles a second of a lock-step match of learning keepers."""
-    command = [sys.executable, str(SCRIPTS / "match.py"), "--task", "3v2", "--episodes"]
-    command += [str(episodes), "--keeper-policy", "learn", "--json", *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return float(json.loads(done.stdout.splitlines()[-1])["cycles_per_second"])
-
-
-def ping_pong(num_players: int, cycles: int) -> float:
-    """Perceptions to as many processes, an answer from each, by the fastest sound method."""
-    import rclpy
-    from rclpy.experimental import EventsExecutor
-
-    from keepaway_msgs.msg import ActionRequest, Perception
-
-    echo = f"import sys; sys.path.insert(0, {str(HERE)!r}); import benchmark; benchmark.echo("
-    players = [subprocess.Popen([sys.executable, "-c", f"{echo}{p})"]) for p in range(num_players)]
-    rclpy.init()
-    node = rclpy.create_node("ping", enable_rosout=False, start_parameter_services=False)
-    executor = EventsExecutor()
-    executor.add_node(node)
-    answered: set[int] = set()
-
-    def take(answer: ActionRequest) -> None:
-        answered.add(answer.player_index)
-
-    pings = [node.create_publisher(Perception, f"bench_{p}/ping", 10) for p in range(num_players)]
-    for p in range(num_players):
-        node.create_subscription(ActionRequest, f"bench_{p}/pong", take, 10)
-    message = perception(num_players)
-    try:
-        for cycle in range(-100, cycles):
-            if cycle == 0:
-                start = time.perf_counter()
-            answered.clear()
-            message.cycle = cycle + 100
-            missing: Iterable[int] = range(num_players)
-            while missing:
-                for p in missing:
-                    pings[p].publish(message)
-                until = time.perf_counter() + 0.5
-                while len(answered) < num_players and time.perf_counter() < until:
-                    executor.spin_once(timeout_sec=0.5)
-                missing = [p for p in range(num_players) if p not in answered]
-        return cycles / (time.perf_counter() - start)
-    finally:
-        for player in players:
-            player.terminate()
-            player.wait(30)
-        node.destroy_node()
-        rclpy.shutdown()
-
-
-def perception(num_players: int):  # type: ignore[no-untyped-def]
-    """A perception as long as a match's."""
-    from keepaway_msgs.msg import Perception
-
-    message = Perception()
-    message.positions = [1.0] * (2 * num_players + 2)
-    message.velocities = [0.1] * (2 * num_players + 2)
-    message.ages = [1] * (num_players + 1)
-    message.cycles_to_ball = [9] * num_players
-    return message
-
-
-def echo(player: int) -> None:
-    """Answer every perception at once; the process of one player of `ping_pong`."""
-    import rclpy
-    from rclpy.executors import ExternalShutdownException
-    from rclpy.experimental import EventsExecutor
-
-    from keepaway_msgs.msg import ActionRequest, Perception
-
-    rclpy.init()
-    node = rclpy.create_node(f"pong_{player}", enable_rosout=False, start_parameter_services=False)
-    executor = EventsExecutor()
-    executor.add_node(node)
-    answer = ActionRequest(player_index=player, action_values=[0.0, 0.0, 0.0])
-    publisher = node.create_publisher(ActionRequest, f"bench_{player}/pong", 10)
-
-    def reply(message: Perception) -> None:
-        answer.cycle = message.cycle
-        publisher.publish(answer)
-
-    node.create_subscription(Perception, f"bench_{player}/ping", reply, 10)
-    try:
-        while rclpy.ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
 
 
 if __name__ == "__main__":

@@ -51,6 +51,25 @@ def test_a_benchmarks_table_has_ratios_to_the_floor(benchmark: ModuleType) -> No
     assert lines[3].split() == ["compile_cold_s", "9.00"]
 
 
+def test_the_performance_page_is_written_from_what_is_kept() -> None:
+    page = load("performance_page")
+    kept = json.loads(page.KEPT.read_text())
+    assert len(kept["runs"]) >= 3
+    assert page.written(page.PAGE.read_text(), kept) == page.PAGE.read_text()
+
+
+def test_a_line_of_the_performance_page_has_median_range_and_ratio() -> None:
+    page = load("performance_page")
+    runs = [
+        {"floor_us": floor, "learn_3v2_us": value}
+        for floor, value in ((1.0, 6.0), (2.0, 8.0), (1.0, 7.0))
+    ]
+    row = page.Row("learning", "learn_3v2_us", base="floor_us")
+    assert page.line(row, runs) == "| learning | 7.0 us (6.0 us to 8.0 us) | 6.00 x the floor |"
+    row = page.Row("floor", "floor_us", "{:.2f} us")
+    assert page.line(row, runs[:1]) == "| floor | 1.00 us |  |"
+
+
 def test_what_grows_is_named_and_what_was_warming_up_is_not(
     endurance: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:
