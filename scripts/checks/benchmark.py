@@ -249,6 +249,7 @@ def measure_study(_: argparse.Namespace) -> dict[str, float]:
         "max_hours": STUDY_HOURS,
         "greedy_episodes": 0,
         "seed": 1,
+        "references": ["scratch"],
     }
     lines = [f"{name} = {json.dumps(value)}" for name, value in settings.items()]
     with tempfile.TemporaryDirectory() as folder:
