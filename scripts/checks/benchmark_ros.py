@@ -135,7 +135,7 @@ def echo(player: int) -> None:
 
 
 def first_cycle() -> float:
-    """Seconds from the start of `match.py` until it says that a cycle has been played."""
+    """Seconds from the start of `match.py` until its clock says that a cycle has been played."""
     os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
     import rclpy
     from rosgraph_msgs.msg import Clock
@@ -145,6 +145,9 @@ def first_cycle() -> float:
     heard: list[float] = []
     node.create_subscription(Clock, "/clock", lambda _: heard.append(time.monotonic()), 10)
     match("--episodes", "1")  # compiles, if need be
+    until = time.monotonic() + 1.0
+    while time.monotonic() < until:  # take in all that this match said
+        rclpy.spin_once(node, timeout_sec=0.1)
     heard.clear()
     start = time.monotonic()
     running = subprocess.Popen(match_command("--episodes", "3"), stdout=subprocess.DEVNULL)
