@@ -33,7 +33,7 @@ class Deciders(NamedTuple):
     random: Draws  # a stream for each player, field by field
     order: np.ndarray  # (num_players,) int64, scratch
     action: np.ndarray  # (num_fields, num_players) int64, what each asks for
-    target: np.ndarray  # (num_fields, num_players) int64, and of whom
+    target: np.ndarray  # (num_fields, num_players) int64, its receiver or marked keeper
     chose: np.ndarray  # (num_fields, num_players) bool: a policy chose it just now
 
 

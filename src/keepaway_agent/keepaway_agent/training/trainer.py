@@ -94,7 +94,7 @@ class Trainer:
 
         Args:
             trials: any number; the next is asked for when a field is free.
-            watch: is told of the progress every WATCH_INTERVAL cycles.
+            watch: is called with the progress every WATCH_INTERVAL cycles.
             watch_cycle: is shown the world before every cycle.
 
         Raises:

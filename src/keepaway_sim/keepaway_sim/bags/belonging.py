@@ -113,7 +113,7 @@ class MatchIds:
             if codec.message_type in (MATCH, AGENT_STATUS):
                 return lambda data, found: _decoded_ids(codec, data, found)
             layouts = list(self._layouts(codec))
-        except KeepawayError:  # whoever needs the topic will say so
+        except KeepawayError:  # a reader that needs the topic reports it
             return None
         return lambda data, found: _ids_in(layouts, data, found)
 
@@ -146,7 +146,7 @@ def _decoded_ids(codec: Codec, data: bytes, found: np.ndarray) -> np.ndarray:
     for row, (first, last) in enumerate(found[:, 2:].tolist()):
         try:
             value = codec.decode(data[first:last]).get("match_id", 0)
-        except KeepawayError:  # whoever needs it will say so
+        except KeepawayError:  # a reader that needs it reports it
             continue
         ids[row] = value if isinstance(value, int) and 0 <= value < 2**64 else 0
     return ids

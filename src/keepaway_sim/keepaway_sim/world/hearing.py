@@ -19,7 +19,7 @@ from keepaway_sim.world.streams import draw
 STALE_BALL = 3  # [cycles] a message about the ball helps a player who saw it longer ago
 CHANGED_VELOCITY = 0.3  # [m/cycle] or one whose idea of its velocity differs by more
 DEAF_RANGE = 3.0  # [m] P: nearer to the ball than this, a player trusts itself
-TOLD_AGE = 2  # [cycles] P: so old is what is told of an opponent
+TOLD_AGE = 2  # [cycles] P: age of the news of an opponent
 SHARED_RANGE = 20.0  # [m] P: a player speaks of a ball it sees nearer than this
 
 
@@ -119,7 +119,7 @@ def _speak_of_ball(w, f, p, command):
     """Tell of a ball that is seen, or that is about to leave player p's reach.
 
     Where the player kicks it away, it tells where that ball will be; a ball that stays in reach
-    is told to lie still.
+    is reported as lying still.
     """
     c, belief, speech, ball = w.constants, w.belief, w.speech, w.ball
     own, place = belief.position[f, p, p], belief.position[f, p, ball]
@@ -164,7 +164,7 @@ def spelled(c, p, x, y):
 def cut(value, step, ahead):
     """A number as one of 73 characters spells it: cut to the lower end of its step.
 
-    P SayMsgDataTypes.h: the steps lie evenly around 0, so what is told is half a step too low in
+    P SayMsgDataTypes.h: the steps lie evenly around 0, so reports are half a step too low in
     the mean, in the team's axes (`ahead`: they point like the field's).
     """
     if step == 0.0:

@@ -74,7 +74,7 @@ def put(w, f, p, j, x, y):
 
 @compiled
 def set_age(w, f, p, j, age):
-    """Player p perceived j, an object or a phantom, so many cycles ago."""
+    """Player p perceived j, an object or a phantom, N cycles ago."""
     if j <= w.ball:
         w.belief.age[f, p, j] = age
     else:

@@ -95,13 +95,20 @@ def _rows(studies: Studies) -> Lines:
         ("fivevfour", "5v4", "time_to_threshold"),
     ):
         if (found := studies.get(name)) is not None:
-            lines += ["", f"### {words}", "", *study_table(found, found.scratch, "row")]
+            lines += ["", f"### {words}", "", *_note(found)]
+            lines += study_table(found, found.scratch, "row")
             lines += ["", shown_picture(words, name, figure)]
     for name in ("rho_variants", "variants_1000"):
         if (found := studies.get(name)) is not None:
-            lines += ["", f"### Other ways than rho (`{name}`)", "", *_variants(found)]
+            lines += ["", f"### Other ways than rho (`{name}`)", "", *_note(found)]
+            lines += _variants(found)
             lines += ["", shown_picture("Hours to 9.0 s by the way of transfer", name)]
     return lines
+
+
+def _note(one: Evidence) -> Lines:
+    """What must be known of a study's trials, such as that they are of an earlier world."""
+    return [one.results.note, ""] if one.results.note else []
 
 
 def _at_lower_threshold(studies: Studies) -> Lines:
@@ -128,7 +135,8 @@ def _optimism(studies: Studies) -> Lines:
     best = optimistic.best("target")
     hours = optimistic.rows[best].target
     lines = [
-        "No 3v2 at all, and every action of every state worth so many seconds at first. The best"
+        "No 3v2 at all, and every action of every state worth a constant number of seconds at"
+        " first. The best"
         f" level is {best}: {spread(hours)} h of 4v3"
         f" ({spread(optimistic.rows[optimistic.scratch].target)} from scratch).",
         *said_of(optimistic, "target", "the time in 4v3"),
@@ -193,6 +201,7 @@ def _beyond_table(studies: Studies) -> Lines:
 def _jumpstart(jumpstart: Evidence) -> Lines:
     reference = jumpstart.scratch
     lines = [
+        *_note(jumpstart),
         f"Seconds held longer than {reference} over the first 100 episodes:",
         "",
         "| row | trials | longer at first (s) | p |",
@@ -219,7 +228,7 @@ def _overtraining(studies: Studies) -> Lines:
     ]
     for name in found:
         one = studies[name]
-        lines += ["", *_lower_level(one)]
+        lines += ["", *_note(one), *_lower_level(one)]
         for reference in one.study.references:
             lines += ["", f"`{name}`, against {reference}:", ""]
             lines += study_table(one, reference, "row")

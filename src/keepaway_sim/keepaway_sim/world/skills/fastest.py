@@ -22,8 +22,8 @@ from keepaway_sim.world.skills.prediction import (
 )
 
 LATELY = 3  # [cycles] P: motion seen longer ago is unknown
-SOON = 4  # [cycles] who is near the ball's place then is asked first
-UNSEEN_LEAD = 2  # [cycles] P: the start of an opponent who has not been seen moving lately
+SOON = 4  # [cycles] the player nearest to the ball's place then is searched first
+UNSEEN_LEAD = 2  # [cycles] P: the start of an opponent not seen moving lately
 
 
 @compiled
@@ -31,7 +31,7 @@ def as_last_seen(w, f, p, j):
     """Player j as player p saw it last, and how many cycles it has had since then.
 
     P predictNrCyclesToPoint: a player who may be first at the ball is taken to have run for it ever
-    since; who has not been seen moving lately runs straight, and an opponent has a start.
+    since; a player not seen moving lately runs straight, and an opponent has a start.
     """
     body, lead, faces = _last_place(w, f, p, j)
     return _with_heading(w, f, p, j, body, faces), lead
@@ -88,7 +88,7 @@ def _nearest(w, f, p, first, last, x, y):
 def fastest_to_ball(w, f, p, first, last, ball, limit):
     """Which known player of first..last-1 reaches a ball first, in player p's belief.
 
-    Who is near is asked first: most others are then ruled out without a search.
+    The nearest player is searched first: most others are then ruled out without a search.
 
     Args:
         ball: Ball.
@@ -96,7 +96,7 @@ def fastest_to_ball(w, f, p, first, last, ball, limit):
 
     Returns:
         the player (-1: nobody), how many cycles from now it meets the ball, how many it needs.
-        Who needs fewer cycles to the same place is faster, then who has the lower index.
+        Of two who arrive in the same cycle the faster needs fewer cycles, then has the lower index.
     """
     c = w.constants
     fastest, when, needed = -1, limit + 1, NEVER

@@ -18,7 +18,7 @@ SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old on
 SAFE_SHARE = 0.7  # [1] of the kickable distance: safely in reach
 BEYOND = 100  # [cycles] P: a ball out of reach is followed to where it is about to lie
 KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one may be met
-UNKNOWN_SPEED = 0.3  # [m/cycle] P: who has not been seen moving lately runs to the point so fast
+UNKNOWN_SPEED = 0.3  # [m/cycle] P: speed of a player not seen moving lately
 TURNS = 3  # [cycles] of turning that a player may be spared where the ball comes its way
 ROUNDING = 1e-6  # [m] more than all rounding of a distance
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
@@ -353,7 +353,7 @@ def straight_run(c, body, lead, ball, limit):
 
 @compiled
 def straight_distance(c, body, cycles):
-    """From no farther away [m] than this a player reaches a point within so many cycles.
+    """From no farther away [m] than this a player reaches a point within N cycles.
 
     It is reached by who faces it, at the speed the player has, and runs at full power.
     """
