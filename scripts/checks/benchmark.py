@@ -251,7 +251,7 @@ def measure_study(_: argparse.Namespace) -> dict[str, float]:
         "seed": 1,
         "references": ["scratch"],
     }
-    lines = [f"{name} = {json.dumps(value)}" for name, value in settings.items()]
+    lines = [f"{name} = {json.dumps(value, allow_nan=False)}" for name, value in settings.items()]
     with tempfile.TemporaryDirectory() as folder:
         study = Path(folder) / "benchmark.toml"
         study.write_text("\n".join([*lines, 'rows = [{ name = "scratch" }]']))
