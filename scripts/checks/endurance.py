@@ -76,6 +76,7 @@ def start(args: argparse.Namespace, folder: Path) -> dict[str, "subprocess.Popen
     """Start recorders, a viewer with a browser, and the match."""
     learn = ["--keeper-policy", "learn", "--save-weights", folder / "weights", "--json"]
     waits = ["--wait-for-recorder"] * bool(args.recorders)
+    waits += ["--answer-timeout", args.answer_timeout]
     commands = {
         **{f"recorder_{n}": ["record.py", folder / f"bag_{n}"] for n in range(args.recorders)},
         "viewer": ["view.py", "--live", "--port", args.port],
@@ -201,6 +202,7 @@ def parse() -> argparse.Namespace:
     add("--minutes", type=float, default=60.0, help="of wall time (default 60)")
     add("--task", default="3v2", help="keepers v takers (default 3v2)")
     add("--recorders", type=int, default=1, help="that record the same match (default 1)")
+    add("--answer-timeout", type=float, default=2.0, help="of the match [s] (default 2)")
     add("--port", type=int, default=8417, help="of the live page (default 8417)")
     add("--domain", type=int, default=74, help="ROS domain (default 74)")
     return parser.parse_args()

@@ -168,7 +168,8 @@ def test_a_player_that_does_not_come_is_named() -> None:
 
 def test_an_agent_of_ones_own_plays_with_ordinary_messages() -> None:
     plain = Path(__file__).with_name("plain_keeper.py")
-    summary, _ = finish(start("--episodes", "2", "--keeper-agent", str(plain)))
+    patient = "--answer-timeout", "60"  # no answer is late because the machine is busy
+    summary, _ = finish(start("--episodes", "2", "--keeper-agent", str(plain), *patient))
     assert summary["troubles"] == {}
     assert episodes(summary) == played(trained(2, policy="hold"))
 

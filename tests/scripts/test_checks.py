@@ -99,7 +99,7 @@ def test_a_sample_is_what_a_process_uses(endurance: ModuleType) -> None:
 @pytest.mark.slow
 def test_a_short_endurance_run_ends_with_a_table(ros_domain: int) -> None:
     command = [sys.executable, str(ROOT / "scripts/checks/endurance.py"), "--minutes", "0.2"]
-    options = ["--domain", str(ros_domain), "--port", "0"]
+    options = ["--domain", str(ros_domain), "--port", "0", "--answer-timeout", "60"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
     assert "nothing is missing" in done.stdout, done.stderr
     told = [line.split()[0] for line in done.stdout.splitlines() if "->" in line]
