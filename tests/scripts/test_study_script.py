@@ -9,6 +9,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]  # comes with distributed
 import pytest
+from children import workers_of
 from distributed import LocalCluster
 
 from keepaway_transfer.studies.results import read_results, read_trials
@@ -50,11 +51,6 @@ def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
     assert head["study"]["seed"] == TINY.seed
 
 
-def workers_of(process):
-    children = psutil.Process(process.pid).children()
-    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
-
-
 @pytest.mark.parametrize(
     ("signals", "code"),
     [
@@ -94,7 +90,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, c
 def test_a_worker_that_is_killed_is_replaced_and_the_study_ends_with_the_same(whole, tmp_path):
     arguments = ("--out", tmp_path / "out", "--workers", 2, "--batch", 1)
     with subprocess.Popen(command(*arguments), stderr=subprocess.PIPE, text=True) as running:
-        while not (workers := workers_of(running)):
+        while not (workers := workers_of(running.pid)):
             assert running.poll() is None
             time.sleep(0.01)
         workers[0].kill()

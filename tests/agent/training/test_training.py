@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import psutil  # type: ignore[import-untyped]
 import pytest
+from children import workers_of
 
 from keepaway_agent.actions import Outcome, Role
 from keepaway_agent.errors import AgentError, WeightsError
@@ -204,9 +205,7 @@ def test_a_training_that_was_killed_leaves_no_process_behind(tmp_path):
         workers: list[psutil.Process] = []
         while len(workers) < 2:
             time.sleep(0.1)
-            workers = [
-                w for w in psutil.Process(killed.pid).children() if "spawn_main" in str(w.cmdline())
-            ]
+            workers = workers_of(killed.pid)
         killed.kill()
     assert psutil.wait_procs(workers, timeout=900)[1] == []
 

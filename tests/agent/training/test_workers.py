@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import psutil  # type: ignore[import-untyped]
 import pytest
+from children import workers_of
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.training import workers
@@ -24,12 +25,6 @@ SCRIPT = Path(__file__).parents[3] / "scripts/train.py"
 TRAINING = Training(episodes=40, seed=11)
 
 
-def workers_of(process: int) -> list[psutil.Process]:
-    """The worker processes of a process, as they are now."""
-    children = psutil.Process(process).children()
-    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
-
-
 def test_what_a_killed_process_had_is_played_again_and_gives_the_same(caplog, tmp_path):
     alone = {r.trial.label: r for r in workers.play_trials(TRAINING, range(6))}
     killed: list[int] = []
@@ -37,8 +32,9 @@ def test_what_a_killed_process_had_is_played_again_and_gives_the_same(caplog, tm
     def kill_one(_: Progress) -> None:
         # the first may have had nothing to play when it was killed
         if len(killed) < 2 and "; trials " not in caplog.text:
-            killed.append(workers_of(os.getpid())[0].pid)
-            os.kill(killed[-1], signal.SIGKILL)
+            for worker in workers_of(os.getpid())[:1]:
+                killed.append(worker.pid)
+                worker.kill()
 
     recorder = TRAINING.recorder(tmp_path / "bag")
     spread = {}
