@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import clip, length, wrap
@@ -20,6 +21,32 @@ FREEZE_SHARE = 0.8
 OVER_POWER = 1.05  # [1] of full power that a pass may lack
 OVER_POWER_PRESSED = 1.30  # with an opponent within PRESSED_RANGE of the ball
 PRESSED_RANGE = 2.0  # [m]
+SAFE_REACH = 0.7  # [1] of the kickable distance, where a frozen ball is brought back to
+
+
+class Stance(NamedTuple):
+    """What a player that kicks believes of itself and of the ball [m, m/cycle, rad]."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    yaw: float
+    ball_x: float
+    ball_y: float
+    ball_vx: float
+    ball_vy: float
+
+
+@compiled
+def stance(w, f, p):
+    """How a player stands to the ball, as it believes."""
+    belief, ball = w.belief, w.ball
+    x, y = belief.position[f, p, p]
+    vx, vy = belief.velocity[f, p, p]
+    bx, by = belief.position[f, p, ball]
+    bvx, bvy = belief.velocity[f, p, ball]
+    return Stance(x, y, vx, vy, belief.body[f, p, p], bx, by, bvx, bvy)
 
 
 @compiled
@@ -40,16 +67,13 @@ def closest_opponent_to(w, f, p, x, y):
 @compiled
 def ball_after(w, f, p, command):
     """Believed place of the ball after this cycle's own command."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    x, y = belief.position[f, p, ball]
-    vx, vy = belief.velocity[f, p, ball]
+    c, s = w.constants, stance(w, f, p)
+    vx, vy = s.ball_vx, s.ball_vy
     if command.kind == KICK:
         _, power, angle = command
-        px, py = belief.position[f, p, p]
-        ax, ay = kick_acceleration(c, power, angle, x - px, y - py, belief.body[f, p, p])
+        ax, ay = kick_acceleration(c, power, angle, s.ball_x - s.x, s.ball_y - s.y, s.yaw)
         vx, vy = limited(vx + ax, vy + ay, c.ball_speed_max)
-    return x + vx, y + vy
+    return s.ball_x + vx, s.ball_y + vy
 
 
 @compiled
@@ -59,37 +83,30 @@ def hold_ball(w, f, p, distance):
     Args:
         distance: share of the kickable margin between body and ball.
     """
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    px, py = belief.position[f, p, p]
-    bx, by = belief.position[f, p, ball]
-    yaw = belief.body[f, p, p]
-    nearest, away = closest_opponent_to(w, f, p, bx, by)
+    c, s = w.constants, stance(w, f, p)
+    nearest, away = closest_opponent_to(w, f, p, s.ball_x, s.ball_y)
     angle = 0.0
     if nearest >= 0 and away < HOLD_RANGE:
         ox, oy = place_of(w, f, p, nearest)
-        from_opponent = math.atan2(py - oy, px - ox)
+        from_opponent = math.atan2(s.y - oy, s.x - ox)
         heads_left = wrap(yaw_of(w, f, p, nearest) - from_opponent) > 0.0
-        angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - yaw)
+        angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - s.yaw)
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
-    spot = length(bx - px - distance * math.cos(angle), by - py - distance * math.sin(angle))
+    spot_x, spot_y = distance * math.cos(angle), distance * math.sin(angle)
+    spot = length(s.ball_x - s.x - spot_x, s.ball_y - s.y - spot_y)
     if spot < AT_SPOT:
         chosen = turn_body_to(w, f, p, GOAL_X if p < c.num_keepers else -GOAL_X, 0.0, 1)
         next_x, next_y = ball_after(w, f, p, Command(NONE, 0.0, 0.0))
-        vx, vy = belief.velocity[f, p, p]
-        stays = length(next_x - px - vx, next_y - py - vy)
+        stays = length(next_x - s.x - s.vx, next_y - s.y - s.vy)
         if stays < STAYS_SHARE * c.kickable_distance:
             return chosen
     return kick_close(w, f, p, angle, distance)
 
 
 @compiled
-def _rate(w, f, p):
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    px, py = belief.position[f, p, p]
-    bx, by = belief.position[f, p, ball]
-    return kick_rate(c, bx - px, by - py, belief.body[f, p, p])
+def _rate(c, s):
+    """Speed that a unit of kick power gives the ball from a stance [m/cycle]."""
+    return kick_rate(c, s.ball_x - s.x, s.ball_y - s.y, s.yaw)
 
 
 @compiled
@@ -100,65 +117,53 @@ def kick_close(w, f, p, angle, distance):
         angle: of the spot, relative to the body [rad].
         distance: share of the kickable margin between body and ball.
     """
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    px, py = belief.position[f, p, p]
-    ux, uy = belief.velocity[f, p, p]
-    bx, by = belief.position[f, p, ball]
-    vx, vy = belief.velocity[f, p, ball]
-    yaw = belief.body[f, p, p]
+    c, s = w.constants, stance(w, f, p)
     reach = c.touch_distance + c.kickable_margin * distance
-    want_x = px + ux + reach * math.cos(yaw + angle) - bx - vx
-    want_y = py + uy + reach * math.sin(yaw + angle) - by - vy
-    power = length(want_x, want_y) / _rate(w, f, p)
-    if power > 100.0 and length(vx, vy) > 0.1:
+    want_x = s.x + s.vx + reach * math.cos(s.yaw + angle) - s.ball_x - s.ball_vx
+    want_y = s.y + s.vy + reach * math.sin(s.yaw + angle) - s.ball_y - s.ball_vy
+    power = length(want_x, want_y) / _rate(c, s)
+    if power > 100.0 and length(s.ball_vx, s.ball_vy) > 0.1:
         return freeze_ball(w, f, p)
-    return Command(KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - yaw))
+    return Command(KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - s.yaw))
 
 
 @compiled
 def freeze_ball(w, f, p):
     """Stop the ball where it is, or bring it back within reach (P: freezeBall)."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    px, py = belief.position[f, p, p]
-    ux, uy = belief.velocity[f, p, p]
-    bx, by = belief.position[f, p, ball]
-    vx, vy = belief.velocity[f, p, ball]
-    power = min(length(vx, vy) / _rate(w, f, p), 100.0)
-    angle = wrap(math.atan2(vy, vx) + math.pi - belief.body[f, p, p])
+    c, s = w.constants, stance(w, f, p)
+    power = min(length(s.ball_vx, s.ball_vy) / _rate(c, s), 100.0)
+    angle = wrap(math.atan2(s.ball_vy, s.ball_vx) + math.pi - s.yaw)
     kick = Command(KICK, power, angle)
     next_x, next_y = ball_after(w, f, p, kick)
-    if length(next_x - px - ux, next_y - py - uy) < FREEZE_SHARE * c.kickable_distance:
+    if length(next_x - s.x - s.vx, next_y - s.y - s.vy) < FREEZE_SHARE * c.kickable_distance:
         return kick
-    rel_x, rel_y = bx - px - ux, by - py - uy
+    rel_x, rel_y = s.ball_x - s.x - s.vx, s.ball_y - s.y - s.vy
     rest = length(rel_x, rel_y)
     reach = min(SAFE_REACH * c.kickable_distance, rest - 0.1)
     direction = math.atan2(rel_y, rel_x)
-    to_x = px + ux + reach * math.cos(direction)
-    to_y = py + uy + reach * math.sin(direction)
-    return accelerate_ball(w, f, p, to_x - bx, to_y - by)
-
-
-SAFE_REACH = 0.7  # [1] of the kickable distance, where a frozen ball is brought back to
+    to_x = s.x + s.vx + reach * math.cos(direction)
+    to_y = s.y + s.vy + reach * math.sin(direction)
+    return accelerate_ball(w, f, p, to_x - s.ball_x, to_y - s.ball_y)
 
 
 @compiled
 def accelerate_ball(w, f, p, want_x, want_y):
     """Give the ball a velocity, or at least its direction (P: accelerateBallToVelocity)."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    vx, vy = belief.velocity[f, p, ball]
-    yaw = belief.body[f, p, p]
-    rate = _rate(w, f, p)
-    ax, ay = want_x - vx, want_y - vy
+    c, s = w.constants, stance(w, f, p)
+    rate = _rate(c, s)
+    ax, ay = want_x - s.ball_vx, want_y - s.ball_vy
     size = length(ax, ay)
     if size < c.ball_accel_max and size / rate <= 100.0:
-        return Command(KICK, size / rate, wrap(math.atan2(ay, ax) - yaw))
-    direction = math.atan2(want_y, want_x)
-    across = -math.sin(direction) * vx + math.cos(direction) * vy
-    angle = direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
-    return Command(KICK, 100.0, wrap(angle - yaw))
+        return Command(KICK, size / rate, wrap(math.atan2(ay, ax) - s.yaw))
+    angle = _full_power_angle(s, math.atan2(want_y, want_x), rate)
+    return Command(KICK, 100.0, wrap(angle - s.yaw))
+
+
+@compiled
+def _full_power_angle(s, direction, rate):
+    """Where to kick with full power so that the ball leaves in a direction [rad, field axes]."""
+    across = -math.sin(direction) * s.ball_vx + math.cos(direction) * s.ball_vy
+    return direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
 
 
 @compiled
@@ -175,37 +180,32 @@ def kick_to(w, f, p, x, y, end_speed):
 
     P: kickTo.
     """
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    px, py = belief.position[f, p, p]
-    ux, uy = belief.velocity[f, p, p]
-    bx, by = belief.position[f, p, ball]
-    vx, vy = belief.velocity[f, p, ball]
-    direction = math.atan2(y - by, x - bx)
-    speed = pass_speed(c, length(x - bx, y - by), end_speed)
+    c, s = w.constants, stance(w, f, p)
+    direction = math.atan2(y - s.ball_y, x - s.ball_x)
+    speed = pass_speed(c, length(x - s.ball_x, y - s.ball_y), end_speed)
     cosine, sine = math.cos(direction), math.sin(direction)
-    if length(px + ux - bx - speed * cosine, py + uy - by - speed * sine) < c.touch_distance:
-        along = abs(cosine * (px - bx) + sine * (py - by))  # the kick would hit the own body
+    gap_x = s.x + s.vx - s.ball_x - speed * cosine
+    gap_y = s.y + s.vy - s.ball_y - speed * sine
+    if length(gap_x, gap_y) < c.touch_distance:  # the kick would hit the own body
+        along = abs(cosine * (s.x - s.ball_x) + sine * (s.y - s.ball_y))
         speed = along - c.touch_distance if speed < along else along + c.touch_distance
-    rate = _rate(w, f, p)
     if speed > c.ball_speed_max:
-        return _kick_unreachable(w, f, p, direction, speed, rate)
-    power = length(speed * cosine - vx, speed * sine - vy) / rate
-    pressed = closest_opponent_to(w, f, p, bx, by)[1] < PRESSED_RANGE
+        return _kick_unreachable(w, f, p, direction, speed)
+    power = length(speed * cosine - s.ball_vx, speed * sine - s.ball_vy) / _rate(c, s)
+    pressed = closest_opponent_to(w, f, p, s.ball_x, s.ball_y)[1] < PRESSED_RANGE
     if power <= 100.0 * (OVER_POWER_PRESSED if pressed else OVER_POWER):
         return accelerate_ball(w, f, p, speed * cosine, speed * sine)
     return kick_close(w, f, p, 0.0, c.setup_distance)
 
 
 @compiled
-def _kick_unreachable(w, f, p, direction, speed, rate):
+def _kick_unreachable(w, f, p, direction, speed):
     """A kick harder than the ball can fly: kick if nearly full speed, else set it up."""
-    c, belief = w.constants, w.belief
-    ball = w.ball
-    vx, vy = belief.velocity[f, p, ball]
-    across = -math.sin(direction) * vx + math.cos(direction) * vy
-    angle = direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
-    reached = length(vx + 100.0 * rate * math.cos(angle), vy + 100.0 * rate * math.sin(angle))
+    c, s = w.constants, stance(w, f, p)
+    rate = _rate(c, s)
+    angle = _full_power_angle(s, direction, rate)
+    gain_x, gain_y = 100.0 * rate * math.cos(angle), 100.0 * rate * math.sin(angle)
+    reached = length(s.ball_vx + gain_x, s.ball_vy + gain_y)
     if reached > c.when_to_kick * c.ball_accel_max:
         return accelerate_ball(w, f, p, speed * math.cos(direction), speed * math.sin(direction))
     if rate > c.when_to_kick * c.kick_power_rate:
