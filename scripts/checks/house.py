@@ -30,7 +30,14 @@ MOST_PARAMETERS = 8
 LONGEST_MODULE = 400  # lines
 EXPECTED = {"log", "main"}
 """Names that every module may have."""
-TWINS = ("compiled.py", "machine_code.py", "parameters.py", "running.py", "settings.py")
+TWINS = (
+    "compiled.py",
+    "machine_code.py",
+    "parameters.py",
+    "passing.py",
+    "running.py",
+    "settings.py",
+)
 """Files that two packages have on purpose, equal but for the package's name."""
 TWIN_NAMES = {
     *("Action", "Role", "Outcome", "NEVER", "HEADER", "CYCLE_TIME", "LOG_PERIOD", "RESEND_PERIOD"),

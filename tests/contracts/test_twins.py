@@ -25,6 +25,7 @@ TWINS = {
     "ros/parameters.py": "nodes/parameters.py",
     "ros/running.py": "nodes/running.py",
     "world/machine_code.py": "machine_code.py",
+    "world/passing.py": "passing.py",
 }
 
 

@@ -32,6 +32,7 @@ SOURCES: Final = (
     "environments/compiled_fields.py",
     "learning",
     "machine_code.py",
+    "passing.py",
     "playing",
     "task.py",
     "training/deciding.py",

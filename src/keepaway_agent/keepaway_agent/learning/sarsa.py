@@ -39,6 +39,7 @@ from keepaway_agent.learning.cmac import (
     tile_cells,
 )
 from keepaway_agent.learning.config import SarsaConfig
+from keepaway_agent.passing import record
 
 NO_ACTION: Final = -1
 """The last action of a learner that has not decided yet in this episode."""
@@ -56,6 +57,7 @@ class Rates(NamedTuple):
     min_trace: float
 
 
+@record
 class Learners(NamedTuple):
     """What any number of learners know and remember, one row each. Made by `make_learners`."""
 

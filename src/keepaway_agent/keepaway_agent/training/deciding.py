@@ -9,6 +9,7 @@ import numpy as np
 from keepaway_agent.actions import Outcome
 from keepaway_agent.compiled import compiled
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE, Learners
+from keepaway_agent.passing import record
 from keepaway_agent.playing.policies import (
     Player,
     View,
@@ -21,6 +22,7 @@ from keepaway_sim.world.state import Belief
 from keepaway_sim.world.streams import Draws
 
 
+@record
 class Deciders(NamedTuple):
     """The players of all fields, and what they answer."""
 

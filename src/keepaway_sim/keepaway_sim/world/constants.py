@@ -21,6 +21,7 @@ from keepaway_sim.world.config import (
     Skills,
     Vision,
 )
+from keepaway_sim.world.passing import record
 
 _GROUPS = (Task, Physics, Vision, Skills)
 _DERIVED = (
@@ -44,9 +45,12 @@ OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
 
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
-Constants: Any = namedtuple(  # type: ignore[misc]
-    "Constants",
-    [name.removesuffix("_deg") for kind in _GROUPS for name in settings_of(kind)] + list(_DERIVED),
+Constants: Any = record(
+    namedtuple(
+        "Constants",
+        [name.removesuffix("_deg") for kind in _GROUPS for name in settings_of(kind)]
+        + list(_DERIVED),
+    )
 )
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.world.config import NEVER
+from keepaway_sim.world.passing import record
 from keepaway_sim.world.streams import Draws
 
 NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0  # kinds of commands
@@ -26,6 +27,7 @@ class Command(NamedTuple):
     angle: float  # [rad] a turn's moment; a kick's direction, relative to the body
 
 
+@record
 class Truth(NamedTuple):
     """The truth of every field; the ball is the last object."""
 
@@ -40,6 +42,7 @@ class Truth(NamedTuple):
     running: np.ndarray  # (F,) bool: started and not stopped
 
 
+@record
 class Belief(NamedTuple):
     """What every player of every field believes.
 
@@ -60,6 +63,7 @@ class Belief(NamedTuple):
     cycle: np.ndarray  # (F,) int64 [cycles] since kick-off
 
 
+@record
 class Memory(NamedTuple):
     """What a player keeps from cycle to cycle beside its belief."""
 
@@ -82,6 +86,7 @@ class Memory(NamedTuple):
     search_sign: np.ndarray  # (F, P) which way round
 
 
+@record
 class Phantoms(NamedTuple):
     """Opponents in whom a player with a limited view believes beside the real ones (S slots)."""
 
@@ -91,6 +96,7 @@ class Phantoms(NamedTuple):
     felt_cycle: np.ndarray  # (F, P, S) int64 and in which cycle
 
 
+@record
 class Speech(NamedTuple):
     """What every player says this cycle, heard by team-mates in the next."""
 
@@ -100,6 +106,7 @@ class Speech(NamedTuple):
     opponent_position: np.ndarray  # (F, P, 2) [m]
 
 
+@record
 class Discs(NamedTuple):
     """Players and ball of the fields of which pymunk is asked; made by `Bodies`.
 
@@ -115,6 +122,7 @@ class Discs(NamedTuple):
     touched: np.ndarray  # (F,) bool by field: discs touch
 
 
+@record
 class Scratch(NamedTuple):
     """Room to calculate in: nothing in it outlives the cycle of one field."""
 
@@ -127,6 +135,7 @@ class Scratch(NamedTuple):
     numbers: np.ndarray  # (P, 2) int64 the numbers that it may have, from .. to
 
 
+@record
 class Fields(NamedTuple):
     """All that compiled functions of the world work on."""
 

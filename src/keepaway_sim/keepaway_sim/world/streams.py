@@ -14,8 +14,10 @@ import numpy as np
 
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.world.compiled import compiled
+from keepaway_sim.world.passing import record
 
 
+@record
 class Draws(NamedTuple):
     """Ready-made random numbers, as compiled functions take them."""
 
