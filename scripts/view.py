@@ -27,7 +27,6 @@ from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.spectator import DRAIN_PERIOD, Spectator
 from keepaway_sim.view.page import replay_page
-from keepaway_sim.view.picture import picture
 from keepaway_sim.view.server import Server
 from keepaway_sim.world.config import CYCLE_TIME
 
@@ -82,6 +81,8 @@ def watch(host: str, port: int, ros: list[str]) -> int:
 
 def take_picture(args: argparse.Namespace, number: int | None) -> int:
     """Write a PNG of one moment, of the bag's first episode if no other is chosen."""
+    from keepaway_sim.view.picture import picture  # matplotlib: half of what this script imports
+
     bag = MatchBag(args.bag, args.match)
     episodes = {episode.number: episode for episode in bag.episodes()}
     number = min(episodes, default=0) if number is None else number
