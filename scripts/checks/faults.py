@@ -133,6 +133,8 @@ class Match:
     def check_bags(self, folder: Path, played: set[int]) -> tuple[int, int]:
         """Every bag can be read or repaired and holds only episodes that were played, each once.
 
+        One whose simulator was killed before it wrote a message is empty.
+
         Returns:
             how many bags there are, and how many episodes are in them.
 
@@ -144,7 +146,7 @@ class Match:
         bags = sorted(self.bag.parent.glob("bag*"))
         for number, bag in enumerate(bags):
             reader = BagReader(bag)
-            if not reader.complete:
+            if not reader.complete and reader.message_count:
                 reader = repair(bag, folder / f"repaired_{number}")
             for message in reader.messages(["/episode"]):
                 recorded.append(int(reader.codec(message.topic).decode(message.data)["number"]))

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
 import rclpy
 from ament_index_python import get_package_share_path
 from rclpy.context import Context
@@ -27,6 +28,11 @@ while {LAST} not in heard:
     rclpy.spin_once(node)
 print("heard {LAST}", flush=True)
 """
+
+
+def test_tests_of_nodes_share_one_worker(request: pytest.FixtureRequest) -> None:
+    if os.environ.get("PYTEST_XDIST_WORKER") and getattr(request.config.option, "loadgroup", False):
+        assert request.node.nodeid.endswith("@ros")  # which xdist adds where it keeps to groups
 
 
 def test_a_perception_goes_over_dds_whole(ros_domain: int) -> None:
