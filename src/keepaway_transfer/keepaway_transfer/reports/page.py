@@ -66,7 +66,7 @@ PAPER = [
     " there.",
 ]  # fmt: skip
 
-HISTORY = [
+EARLIER_WORLD = [
     "The world of version e3f9ad8 differed from the real server in learned play: keepers chose"
     " again in every cycle of a pass, rewards counted from the decision, and who marks skipped the"
     " ball holder. Now these are the real players' rules, and Table 2 was played anew. In the world"
@@ -370,9 +370,9 @@ def _scratch_rows(studies: Studies) -> Lines:
 def _history(studies: Studies) -> Lines:
     """What Table 2 was before the world's rules were mended."""
     if (before := studies.get("table2_before")) is None:
-        return HISTORY
+        return EARLIER_WORLD
     return [
-        *HISTORY,
+        *EARLIER_WORLD,
         "",
         *_note(before),
         *said_of(before, "target", "the time in 4v3"),
