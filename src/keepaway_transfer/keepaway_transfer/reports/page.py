@@ -175,6 +175,7 @@ def _beyond(studies: Studies) -> Lines:
     for name in ("jumpstart", "jumpstart_framework"):
         if (jumpstart := studies.get(name)) is not None:
             lines += ["", f"### The first episodes (`{name}`)", "", *_jumpstart(jumpstart)]
+            lines += ["", shown_picture("Learning in the first hours", name, "learning_curves")]
     return lines
 
 

@@ -56,7 +56,7 @@ def learning_curves(
         fontsize=8,
     )  # fmt: skip
     axes.set_xlim(left=0)
-    axes.legend(frameon=False, loc="lower right")
+    axes.legend(frameon=False, loc="best")
     return figure
 
 

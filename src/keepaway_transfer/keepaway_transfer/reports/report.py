@@ -74,8 +74,8 @@ def write_report(
         results: that were read.
         folder: made if it does not exist.
         threshold: another than the study's [s].
-        curves: rows whose learning curves are drawn beside those from scratch; by default the one
-            with the shortest total time.
+        curves: rows whose learning curves are drawn beside those from scratch; by default the
+            study's other references and the row with the shortest total time.
 
     Returns:
         the table.
@@ -88,7 +88,8 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     text = f"{table(study, rows, threshold)}\n{power(measures, study)}\n\n{made_by}\n"
     (folder / "table.md").write_text(text, encoding="utf-8")
-    drawn = [study.references[0], *(curves or _best(rows, study.references[0]))]
+    chosen = curves or [*study.references[1:], *_best(rows, study.references[0])]
+    drawn = list(dict.fromkeys([study.references[0], *chosen]))
     for name, figure in _figures(results, measures, rows, drawn, threshold).items():
         plotting.save_figure(figure, folder / f"{name}.png", made_by)
     return text
