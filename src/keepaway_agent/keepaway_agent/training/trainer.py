@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from keepaway_agent.actions import Outcome, Role
-from keepaway_agent.compiled import Kernel
+from keepaway_agent.compiled import Kernel, prepare
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning import sarsa
 from keepaway_agent.learning.sarsa import UNIFORMS_PER_CHOICE
@@ -58,7 +58,7 @@ class Trainer:
         """
         task = config.task
         self.config, self.progress = config, Progress()
-        self._world = World(task, config.world, num_fields)
+        self._world = World(task, config.world, num_fields, is_stepped=False)
         self._teams = {role: _Team(config, role, num_fields) for role in Role}
         self._streams = RandomStreams(
             num_fields * task.num_players, reserve=UNIFORMS_PER_CHOICE, block=512
@@ -79,7 +79,7 @@ class Trainer:
         )
         self._everywhere = np.ones(num_fields, dtype=np.bool_)
         self._decide_all = Kernel(decide_all, self._deciders)
-        self._decide_all.compile_for(self._everywhere)
+        prepare(*self._world.calls, (self._decide_all, (self._everywhere,)))
         self._lives: list[RunningTrial | None] = [None] * num_fields
         self._cycles_left = np.zeros(num_fields, dtype=np.int64)  # of the trial, from kick-off
         self._watched: set[int] = set()  # fields whose trial has a `watch`

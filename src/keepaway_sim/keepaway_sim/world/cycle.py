@@ -61,7 +61,6 @@ def _kick_off(w, f):
         forget(w, f, p)
         speech.ball_age[f, p] = -1
         speech.opponent[f, p] = -1
-    _perceive(w, f)
 
 
 @compiled_apart
@@ -215,9 +214,9 @@ def end_cycle(w, f):
     w.truth.time[f] += 1
     if w.belief.outcome[f] != _IN_PLAY:
         _kick_off(w, f)
-        return
-    _come_to_rest(w, f)
-    _judge_ball(w, f)
+    else:
+        _come_to_rest(w, f)
+        _judge_ball(w, f)
     _perceive(w, f)
 
 

@@ -7,7 +7,7 @@ node plays a World of one field, the trainer Worlds of hundreds; there is no oth
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,8 +48,8 @@ class World:
         Args:
             task, config: what is played and how.
             num_fields: side by side.
-            is_stepped: compile what `step` calls now. Who plays cycles by compiled functions of
-                his own (`begin_cycle`, `move`, `end_cycle`) needs none of it.
+            is_stepped: compile what `step` calls now. Who compiles it together with functions of
+                its own (`calls`), or plays cycles by those alone, needs none of it here.
 
         Raises:
             KeepawayError: `num_fields` is not positive.
@@ -64,9 +64,17 @@ class World:
         self.fields = make_fields(pack(task, config), self._bodies.discs, self._streams.draws)
         self._everywhere = np.ones(num_fields, dtype=np.bool_)
         self._act, self._settle = Kernel(act, self.fields), Kernel(settle, self.fields)
-        requests = self.truth.action, self.truth.target
         if is_stepped:
-            prepare((self._act, (self._everywhere, *requests)), (self._settle, (self._everywhere,)))
+            prepare(*self.calls)
+
+    @property
+    def calls(self) -> list[tuple[Any, tuple[Any, ...]]]:
+        """What `step` calls, for `prepare`; the longest to compile comes first."""
+        requests = self.truth.action, self.truth.target
+        return [
+            (self._settle, (self._everywhere,)),
+            (self._act, (self._everywhere, *requests)),
+        ]
 
     @property
     def truth(self) -> Truth:

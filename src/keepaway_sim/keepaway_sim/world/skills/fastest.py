@@ -202,18 +202,17 @@ def fastest_keeper(w, f, p, chase):
             known has changed since, and nothing was seen.
     """
     n, ball = w.constants.num_keepers, ball_of(w, f, p)
+    rival, sooner, its_cycles = chase.player, chase.when, chase.needed
     holds = chase.num_known == _num_known(w, f, p) and chase.ball == ball
-    if p >= n:
-        keeper, needed = chase.player, chase.needed
-        if not holds:
-            keeper, _, needed = _first_opponent(w, f, p, ball, _horizon(w))
-        return (keeper, needed) if keeper < n else (-1, NEVER)
-    taker, sooner = chase.player, chase.when
-    limit = sooner if holds and taker >= 0 else _horizon(w)
-    keeper, when, needed = fastest_to_ball(w, f, p, 0, n, ball, limit)
+    keeper, when, needed = -1, _horizon(w) + 1, NEVER
+    if p < n:
+        limit = sooner if holds and rival >= 0 else _horizon(w)
+        keeper, when, needed = fastest_to_ball(w, f, p, 0, n, ball, limit)
     if not holds:
-        taker, sooner, _ = _first_opponent(w, f, p, ball, when - 1)
-    if taker >= 0 and sooner < when:
+        rival, sooner, its_cycles = _first_opponent(w, f, p, ball, when - 1)
+    if p >= n:
+        return (rival, its_cycles) if rival < n else (-1, NEVER)
+    if rival >= 0 and sooner < when:
         x, y = ball_ahead(w.constants, ball, sooner)
         return fastest_to_point(w, f, p, 0, n, x, y)
     return keeper, needed
