@@ -106,6 +106,17 @@ def test_code_is_compiled_once_and_found_again_after_another_commit(checkout: Ch
     assert checkout.ask() == (10, "")
 
 
+def test_kept_code_is_loaded_without_all_that_compiling_needs(checkout: Checkout) -> None:
+    checkout.ask()
+    script = (
+        ASK.format(module=CALLERS[1]) + "; import sys; print('numba.np.arraymath' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=checkout.env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["10", "False"]
+
+
 def test_a_folder_of_ones_own_is_used(checkout: Checkout, tmp_path: Path) -> None:
     checkout.env["NUMBA_CACHE_DIR"] = str(tmp_path / "own")
     checkout.ask()

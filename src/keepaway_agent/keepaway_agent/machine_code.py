@@ -148,3 +148,15 @@ class SharedCache(FunctionCache):
     """Keeps a function's machine code in the folder of these sources."""
 
     _impl_class = _SharedCacheImpl
+
+
+class BareCache(SharedCache):
+    """The same for functions that need nothing of numba to run.
+
+    Numba first loads all that it may compile with, half of scipy among it, which takes longer than
+    loading the code. Where there is none on disk, compiling does so itself.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What is kept for these types; None: nothing is."""
+        return self._load_overload(sig, target_context)
