@@ -56,7 +56,7 @@ def learning_curves(
         fontsize=8,
     )  # fmt: skip
     axes.set_xlim(left=0)
-    axes.legend(frameon=False, loc="best")
+    axes.legend(edgecolor="none", loc="best")  # its white ground keeps lines from the words
     return figure
 
 
