@@ -106,11 +106,11 @@ def _rows(studies: Studies) -> Lines:
             lines += ["", f"### {words}", "", *_note(found)]
             lines += study_table(found, found.scratch, "row")
             lines += ["", shown_picture(words, name, figure)]
-    for name in ("rho_variants", "variants_1000"):
-        if (found := studies.get(name)) is not None:
-            lines += ["", f"### Other ways than rho (`{name}`)", "", *_note(found)]
-            lines += _variants(found)
-            lines += ["", shown_picture("Hours to 9.0 s by the way of transfer", name)]
+    if (variants := studies.get("variants_1000")) is not None:
+        lines += ["", "### Other ways than rho (`variants_1000`)", "", *_parts_of_rho(variants)]
+        lines += _variants(variants)
+        picture = shown_picture("Hours to 9.0 s by the way of transfer", "variants_1000")
+        lines += ["", picture]
     return lines
 
 
@@ -128,6 +128,29 @@ def _at_lower_threshold(studies: Studies) -> Lines:
         return []
     title = f"### The same trials to {LOWER_THRESHOLD:g} s"
     return ["", title, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
+
+
+def _parts_of_rho(variants: Evidence) -> Lines:
+    """What each part of what rho carries saves by itself."""
+    gain = {
+        name: spread(row.against[variants.scratch].target)
+        for name, row in variants.rows.items()
+        if name != variants.scratch
+    }
+    at_5 = variants.rows["shape, preferences at 5 s"].against["optimistic at 5 s"]
+    return [
+        f"Hours of 4v3 saved against scratch: by rho {gain['rho']}. What rho carries is a level"
+        " (the mean value of an action), a shape (differences between states) and preferences"
+        f" (differences between actions). The level alone saves {gain['level']}, the shape alone"
+        f" {gain['shape']}, preferences alone {gain['preferences']}, shape and preferences without"
+        f" the level {gain['shape, preferences']}. A mapping that is shuffled saves"
+        f" {gain['shuffled']}.",
+        "",
+        "At a level of 5 s, shape and preferences save"
+        f" {spread(at_5.target)} h of 4v3 against the constant 5 s, and {spread(at_5.total)} h in"
+        " all, where the hours of 3v2 count.",
+        "",
+    ]
 
 
 def _variants(variants: Evidence) -> Lines:
