@@ -179,6 +179,7 @@ def _child() -> None:
     """Compile what the parent asks for; it ends as soon as it is interrupted."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     gc.disable()  # a seventh of the time, in a process that soon ends
+    sys.modules["scipy"] = None  # type: ignore[assignment] # numba would load it; no function needs it
     module, name, types = pickle.load(sys.stdin.buffer)
     function = getattr(importlib.import_module(module), name)
     getattr(function, "entry", function).compile(types)
