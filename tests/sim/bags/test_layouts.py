@@ -14,6 +14,7 @@ from recorded import record_match
 
 from keepaway_sim.analysis.tally import episode_table
 from keepaway_sim.bags import merging
+from keepaway_sim.bags.belonging import Belonging
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.marked import with_markers
 from keepaway_sim.bags.match_bag import MatchBag
@@ -229,6 +230,23 @@ def test_messages_of_a_match_that_nobody_described_are_not_counted_and_are_said(
     assert f"{numbers} messages are of another match" in said_of(path)
     unnumbered = write(tmp_path / "old.mcap", in_turn(numbered(messages, 7), messages[1:]))
     assert "messages came more than once" in said_of(unnumbered)
+
+
+def test_matches_in_other_namespaces_are_no_match_on_the_same_topics(
+    messages: Many, tmp_path: Path
+) -> None:
+    """Also for the root, whose name all others begin with."""
+    beside = [in_namespace(said) for said in numbered(messages, 8)]
+    path = write(tmp_path / "bag.mcap", in_turn(numbered(messages, 7), beside))
+    for number in (1, 2):
+        assert count_gaps(MatchBag(path, number)).report().startswith("nothing is missing")
+        assert MatchBag(path, number).found.strange == 0
+
+
+def test_large_numbers_of_matches_are_told_apart_to_the_last_digit() -> None:
+    ids = np.array([2**63 + 1, 2**63 + 2], np.uint64)
+    unnumbered = Belonging(0, (5, 2**63 + 1))
+    assert unnumbered.chosen(ids, 0, np.zeros((2, 4), np.int64)).tolist() == [False, True]
 
 
 def said_of(path: Path) -> str:

@@ -21,7 +21,9 @@ from keepaway_sim.wire.messages import (
     PERCEPTION,
 )
 
-_NUMBERED = (MATCH, AGENT_STATUS, EPISODE, FIELD_STATE, PERCEPTION, ACTION_REQUEST)
+_DEPTHS = {MATCH: 0, EPISODE: 0, FIELD_STATE: 0}
+_DEPTHS |= {AGENT_STATUS: 1, PERCEPTION: 1, ACTION_REQUEST: 1}  # below the player's name
+"""Slashes in the names of topics whose messages carry a match's number, within its namespace."""
 
 
 class Span(NamedTuple):
@@ -62,7 +64,7 @@ class Belonging(NamedTuple):
         if self.match_id:
             chosen = (ids == self.match_id) | (inside & (ids == 0))
         else:
-            chosen = inside & ~np.isin(ids, self.others)
+            chosen = inside & ~np.isin(ids, np.array(self.others, np.uint64))
         return chosen
 
 
@@ -90,8 +92,10 @@ class MatchIds:
         """
         self._lengths = [lengths_of(task) for task in dict.fromkeys(tasks)]
         self._readers: dict[int, Callable[[bytes, np.ndarray], np.ndarray]] = {}
+        prefix = f"{namespace}/"
         for number, topic in enumerate(reader.kinds):
-            if topic.message_type in _NUMBERED and topic.name.startswith(f"{namespace}/"):
+            depth = topic.name.removeprefix(prefix).count("/")
+            if topic.name.startswith(prefix) and depth == _DEPTHS.get(topic.message_type):
                 found = self._reader_of(reader, number)
                 if found:
                     self._readers[number] = found
