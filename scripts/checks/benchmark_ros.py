@@ -135,7 +135,7 @@ def echo(player: int) -> None:
 
 
 def first_cycle() -> float:
-    """Seconds from the start of `match.py` until its clock says that a cycle has been played."""
+    """Seconds from the start of `match.py` until `/clock` shows that a cycle has been played."""
     os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
     import rclpy
     from rosgraph_msgs.msg import Clock
@@ -146,13 +146,15 @@ def first_cycle() -> float:
     node.create_subscription(Clock, "/clock", lambda _: heard.append(time.monotonic()), 10)
     match("--episodes", "1")  # compiles, if need be
     until = time.monotonic() + 1.0
-    while time.monotonic() < until:  # take in all that this match said
+    while time.monotonic() < until:  # take in all that this match published
         rclpy.spin_once(node, timeout_sec=0.1)
     heard.clear()
     start = time.monotonic()
     running = subprocess.Popen(match_command("--episodes", "3"), stdout=subprocess.DEVNULL)
     try:
         while not heard:
+            if running.poll() is not None:
+                raise RuntimeError(f"the match ended with {running.returncode} before a cycle")
             rclpy.spin_once(node, timeout_sec=0.1)
         return heard[0] - start
     finally:

@@ -132,7 +132,7 @@ def killed_worker_of_a_training(folder: Path) -> None:
 )
 def killed_worker_of_a_study(folder: Path) -> None:
     """Where `ProcessPoolExecutor` gave up everything."""
-    run_tests("tests/transfer/studies/test_processes.py")
+    run_tests("tests/transfer/studies/test_study_processes.py")
     run_tests("tests/scripts/test_study_script.py", "-k", "killed")
 
 
