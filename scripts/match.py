@@ -353,7 +353,7 @@ def program(args: argparse.Namespace, name: str, kind: str) -> list[str]:
 
 
 def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
-    """Say how it went; without an error where somebody learns, as a match is one trial."""
+    """Say how it went; without an error where a player learns, as a match is one trial."""
     if "learn" in (args.keeper_policy, args.taker_policy):
         summary = {**summary, "sem_duration_s": None}
     mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))

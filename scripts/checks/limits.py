@@ -4,7 +4,7 @@
     .venv/bin/python scripts/checks/limits.py --made 20         # and hostile bags made here
 
 Each reader is run as a person runs it, with its imports, on every file of less than 1 MB. It must
-end by itself with 0 or 1, without a traceback, print nothing that rules a terminal, and write no
+end by itself with 0 or 1, without a traceback, print no control characters, and write no
 NaN into a page. The table shows the most that each reader took; ends with 1 where one took more, or
 did otherwise.
 """
@@ -159,7 +159,7 @@ def faults(said: str, pages: list[str], code: int, cpu: float, memory: float) ->
     if "Traceback" in said:
         yield "a traceback"
     if not all(line.isprintable() for line in said.replace("\t", " ").split("\n")):
-        yield f"prints what rules a terminal: {said[:200]!a}"
+        yield f"prints control characters: {said[:200]!a}"
     if code == 1 and not said.strip():
         yield "refused without a word"
     if any("NaN" in page.partition(DATA)[2].partition("<")[0] for page in pages):

@@ -125,7 +125,7 @@ def test_what_is_wrong_with_a_reader_is_said() -> None:
         "6.0 s of CPU",
         "501 MB",
         "a traceback",
-        f"prints what rules a terminal: {said!a}",
+        f"prints control characters: {said!a}",
         "NaN in a page",
     ]
     assert list(faults("", [], 1, 1.0, 100.0)) == ["refused without a word"]

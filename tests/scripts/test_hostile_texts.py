@@ -58,7 +58,7 @@ BAGS: dict[str, Callable[[Many], Many]] = {
 
 
 @pytest.mark.parametrize("kind", BAGS)
-def test_no_tool_prints_what_rules_a_terminal_or_is_html(
+def test_no_tool_prints_control_characters_or_markup(
     messages: Many, tmp_path: Path, kind: str
 ) -> None:
     bag = write(tmp_path / "bag.mcap", BAGS[kind](messages), {"agents": AGENTS})

@@ -21,7 +21,7 @@ class SettingError(KeepawayError):
 
 
 def one_line(text: str) -> str:
-    r"""An untrusted text as one printable line: what would rule a terminal is escaped.
+    r"""An untrusted text as one printable line: control characters are escaped.
 
     >>> print(one_line("red \x1b[31m, line\nbreak"))
     red \x1b[31m, line\nbreak

@@ -16,13 +16,13 @@ from keepaway_sim.world.world import World
 LONG_SIDE: Final = 480
 """Pixels along the longer side of a frame."""
 BLOCK: Final = 16
-"""Both sides are multiples of N pixels, as video codecs want them."""
+"""Both sides of a frame are multiples of this [pixels], as video codecs need."""
 MARGIN: Final = 1.6
 """Metres of grass beyond the lines."""
 TRAIL: Final = 25
 """Cycles of the ball's way that are drawn."""
 _FINE: Final = 2
-"""Drawn N times as large and scaled down, for smooth edges."""
+"""A frame is drawn this many times as large and scaled down, for smooth edges."""
 _STRIPES: Final = 5
 
 

@@ -117,7 +117,7 @@ def learn_in_stages(
 
 
 def _record(trainer: Trainer, results: Sequence[TrialResult]) -> Trajectories:
-    """Every trial goes on from its last weights, learning, for RECORDED episodes."""
+    """Continue every trial from its last weights, learning, for RECORDED episodes."""
     recorder = TrajectoryRecorder(len(results))
     trials = [
         dataclasses.replace(

@@ -216,7 +216,7 @@ def check_count(count: int) -> int:
 
 
 def printable(text: object) -> str:
-    """Of an untrusted text as much as a line holds, without anything that rules a terminal."""
+    """Of an untrusted text as much as a line holds, without control characters."""
     return repr(str(text)[:40])
 
 

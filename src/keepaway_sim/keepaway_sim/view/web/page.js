@@ -529,7 +529,7 @@ function advance(time) {
   requestAnimationFrame(advance);
 }
 
-/** Advance by N cycles; at an episode's end wait a moment, then play the next one. */
+/** Advance by a number of cycles; at an episode's end wait a moment, then play the next one. */
 let waited = 0;
 function step(cycles) {
   if (view.frame < lastFrame()) {

@@ -7,7 +7,7 @@ function decode(text) {
   return new Int16Array(bytes.buffer);
 }
 
-/** An episode's frames, of N numbers each. */
+/** An episode's frames, of `size` numbers each. */
 function framesOf(text, size) {
   const all = decode(text), frames = [];
   for (let at = 0; at < all.length; at += size) frames.push(all.subarray(at, at + size));
