@@ -33,6 +33,7 @@ MOST_GROWTH = 8.0  # [MB] from then on; the counts of episodes are kept in memor
 MOST_HANDLES = 2  # file descriptors and threads that may come and go
 PATIENCE = 300.0  # [s] for the match to begin (a first start compiles), and for all to end
 MEGABYTE = 2**20
+ENDED = (0, 128 + signal.SIGINT)  # exit codes of what ends by itself, and of what Ctrl-C ends
 
 
 class Sample(NamedTuple):
@@ -69,7 +70,7 @@ def main() -> int:
     )
     print(*reports, sep="\n")
     print(f"growing: {', '.join(growing) or 'nothing'}; exit codes {ended}")
-    return int(bool(growing) or any(code for name, code in ended.items() if name != "match"))
+    return int(bool(growing) or any(code not in ENDED for code in ended.values()))
 
 
 def start(args: argparse.Namespace, folder: Path) -> dict[str, "subprocess.Popen[bytes]"]:
