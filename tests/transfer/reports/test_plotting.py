@@ -40,8 +40,8 @@ def test_a_figure_is_written_with_what_made_it(curve_figure, tmp_path):
 def test_time_to_threshold_draws_an_estimate_a_row():
     target = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
     total = [statistics.Interval(8, 7, 9), statistics.Interval(7, 6, 8)]
-    figure = plotting.time_to_threshold_figure(
-        ["0", "1,000"], target, total, target[0], title="4v3", rows_are="Episodes of 3v2"
+    figure = plotting.times_by_amount(
+        ["0", "1,000"], target, total, target[0], title="4v3", amount="Episodes of 3v2"
     )
     estimates = [y.tolist() for x, y in lines(figure) if len(x) == 2]
     assert [8, 5] in estimates
@@ -69,14 +69,15 @@ def test_where_all_trials_have_reached_it_the_axis_ends_soon_after():
         assert axes.get_xlim() == pytest.approx((0, end))
 
 
-def test_only_rows_with_an_order_are_connected():
-    times = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
-    for connected, style in ((True, "-"), (False, "None")):
-        figure = plotting.time_to_threshold_figure(
-            ["a", "b"], times, times, times[0], title="4v3", rows_are="Way", connected=connected
-        )
-        (axes,) = figure.axes
-        assert {line.get_linestyle() for line in axes.lines if line.get_marker() == "o"} == {style}
+def test_ways_are_listed_from_the_top_and_not_connected():
+    target = [statistics.Interval(8, 7, 9), statistics.Interval(5, 4, 6)]
+    total = [statistics.Interval(8, 7, 9), statistics.Interval(7, 6, 8)]
+    (axes,) = plotting.times_by_way(["a", "b"], target, total, target[0], title="4v3").axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]
+    assert axes.get_yticks().tolist() == [1, 0]
+    points = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [line.get_xdata().tolist() for line in points] == [[8, 5], [8, 7]]
+    assert {line.get_linestyle() for line in points} == {"None"}
 
 
 def test_the_distribution_of_durations_falls_by_one_episode_a_step():

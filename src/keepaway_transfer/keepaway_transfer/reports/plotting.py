@@ -4,6 +4,7 @@ Figures are made without a display and without pyplot's global state. Every file
 metadata and in a line below the axes what made it.
 """
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -22,6 +23,8 @@ from keepaway_transfer.reports.statistics import Curve, Interval, SurvivalCurve
 ROW_COLOURS = ("#444444", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which colour-blind people can tell apart; the first is for the scratch row."""
 FAINT, BAND = 0.45, 0.18  # opacity of single trials and of intervals
+HOURS = "Simulated hours to threshold"
+LINE = 155  # letters of the line below the axes
 
 
 class CurveGroup(NamedTuple):
@@ -60,17 +63,16 @@ def learning_curves(
     return figure
 
 
-def time_to_threshold_figure(
+def times_by_amount(
     rows: Sequence[str],
     target: Sequence[Interval],
     total: Sequence[Interval],
     scratch: Interval,
     *,
     title: str,
-    rows_are: str,
-    connected: bool = True,
+    amount: str,
 ) -> Figure:
-    """Hours to the threshold, row by row.
+    """Hours to the threshold by how much of something came before.
 
     Args:
         rows: label of each row, in order.
@@ -78,27 +80,65 @@ def time_to_threshold_figure(
         total: hours on source and target task together.
         scratch: hours of learning from scratch, a band across.
         title: above the axes.
-        rows_are: what the rows differ in, below the axes.
-        connected: by lines, as rows are whose order means something.
+        amount: what the rows have more and more of, below the axes.
     """
-    figure, axes = _figure(title, rows_are, "Simulated hours to threshold")
+    figure, axes = _figure(title, amount, HOURS)
     axes.axhspan(scratch.low, scratch.high, color=ROW_COLOURS[0], alpha=BAND, linewidth=0)
     axes.axhline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label="from scratch")
     places = np.arange(len(rows))
-    for label, intervals, colour, shift in (
-        ("target task", target, ROW_COLOURS[1], -0.08),
-        ("source + target", total, ROW_COLOURS[2], 0.08),
-    ):
+    for label, intervals, colour, shift in _both_times(target, total):
         estimate, low, high = np.array(intervals).T
         axes.errorbar(
             places + shift, estimate, [estimate - low, high - estimate], color=colour,
             marker="o", markersize=5, capsize=3, linewidth=1.2, label=label,
-            linestyle="-" if connected else "none",
         )  # fmt: skip
     axes.set_xticks(places, rows)
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False)
     return figure
+
+
+def times_by_way(
+    rows: Sequence[str],
+    target: Sequence[Interval],
+    total: Sequence[Interval],
+    scratch: Interval,
+    *,
+    title: str,
+) -> Figure:
+    """Hours to the threshold by the way of transfer, one row under the other.
+
+    Args:
+        rows: label of each row, from the top.
+        target: hours on the target task alone.
+        total: hours on source and target task together.
+        scratch: hours of learning from scratch, a band from top to bottom.
+        title: above the axes.
+    """
+    figure, axes = _figure(title, HOURS, "", height=1.6 + 0.3 * len(rows))
+    axes.axvspan(scratch.low, scratch.high, color=ROW_COLOURS[0], alpha=BAND, linewidth=0)
+    axes.axvline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label="from scratch")
+    places = np.arange(len(rows))[::-1]
+    for label, intervals, colour, shift in _both_times(target, total):
+        estimate, low, high = np.array(intervals).T
+        axes.errorbar(
+            estimate, places - shift, xerr=[estimate - low, high - estimate], color=colour,
+            marker="o", markersize=5, capsize=3, linewidth=1.2, label=label, linestyle="none",
+        )  # fmt: skip
+    axes.set_yticks(places, rows)
+    axes.set_xlim(left=0)
+    axes.legend(edgecolor="none")
+    return figure
+
+
+def _both_times(
+    target: Sequence[Interval], total: Sequence[Interval]
+) -> list[tuple[str, Sequence[Interval], str, float]]:
+    """Label, times, colour and place beside the row's own of the two kinds of hours."""
+    return [
+        ("target task", target, ROW_COLOURS[1], -0.08),
+        ("source + target", total, ROW_COLOURS[2], 0.08),
+    ]
 
 
 def share_reached(curves: Mapping[str, SurvivalCurve], limit: float, title: str) -> Figure:
@@ -175,13 +215,15 @@ def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> 
 
 def save_figure(figure: Figure, path: Path | str, made_by: str) -> None:
     """Write a PNG that names what made it: study, settings, seed, version."""
-    figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4")
+    figure.text(0.01, 0.005, textwrap.fill(made_by, LINE), fontsize=6, color="0.4")
     figure.savefig(path, dpi=150, metadata={"Description": made_by})
 
 
-def _figure(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
-    above_made_by = ConstrainedLayoutEngine(rect=(0, 0.02, 1, 0.98))
-    figure = Figure(figsize=(7.2, 4.6), layout=above_made_by)
+def _figure(title: str, x_label: str, y_label: str, height: float = 4.6) -> tuple[Figure, Axes]:
+    made_by = 0.23 / height  # two lines below the axes
+    figure = Figure(
+        figsize=(7.2, height), layout=ConstrainedLayoutEngine(rect=(0, made_by, 1, 1 - made_by))
+    )
     axes = figure.add_subplot()
     axes.set_title(title, fontsize=11, loc="left")
     axes.set_xlabel(x_label)

@@ -170,7 +170,9 @@ def _figures(
     study = results.study
     records = {name: [one for one in results.records if one.row == name] for name in drawn}
     figures = (
-        _time_figures(study, measures, rows, threshold) if any(r.reached for r in rows) else {}
+        _time_figures(study, measures, rows, drawn, threshold)
+        if any(r.reached for r in rows)
+        else {}
     )
     if all(one.has_episodes for row in records.values() for one in row):
         figures |= _episode_figures(study, records, threshold)
@@ -181,20 +183,24 @@ def _time_figures(
     study: Study,
     measures: Sequence[TrialMeasures],
     rows: Sequence[RowSummary],
+    drawn: Sequence[str],
     threshold: float,
 ) -> dict[str, Figure]:
     goal = f"Time to a mean of {threshold:g} s in {study.target}"
+    amount = _amount_of(study)
+    times = (
+        [row.name for row in rows],
+        [row.target for row in rows],
+        [row.total for row in rows],
+        next(row.target for row in rows if row.name == study.references[0]),
+    )
+    many = not amount and len(rows) > len(plotting.ROW_COLOURS)
+    shown = [row for row in rows if row.name in drawn] if many else rows
     return {
-        "time_to_threshold": plotting.time_to_threshold_figure(
-            [row.name for row in rows],
-            [row.target for row in rows],
-            [row.total for row in rows],
-            next(row.target for row in rows if row.name == study.references[0]),
-            title=goal,
-            rows_are=_amount_of(study) or "Way of transfer",
-            connected=bool(_amount_of(study)),
-        ),
-        "share_reached": plotting.share_reached(_reached(measures, rows), study.max_hours, goal),
+        "time_to_threshold": plotting.times_by_amount(*times, title=goal, amount=amount)
+        if amount
+        else plotting.times_by_way(*times, title=goal),
+        "share_reached": plotting.share_reached(_reached(measures, shown), study.max_hours, goal),
     }
 
 
