@@ -76,7 +76,7 @@ def test_ways_are_listed_from_the_top_and_not_connected():
     assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]
     assert axes.get_yticks().tolist() == [1, 0]
     points = [line for line in axes.lines if line.get_marker() == "o"]
-    assert [line.get_xdata().tolist() for line in points] == [[8, 5], [8, 7]]
+    assert [np.asarray(line.get_xdata()).tolist() for line in points] == [[8, 5], [8, 7]]
     assert {line.get_linestyle() for line in points} == {"None"}
 
 
