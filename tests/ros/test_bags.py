@@ -1,5 +1,6 @@
 """Recorder and replayer as processes over DDS: what is said is recorded, and said again."""
 
+import itertools
 import json
 import signal
 import subprocess
@@ -18,7 +19,7 @@ from rosbags.highlevel import AnyReader
 
 from keepaway_agent.actions import Role
 from keepaway_agent.nodes.player import PlayerNode
-from keepaway_msgs.msg import ActionRequest, Match
+from keepaway_msgs.msg import ActionRequest, FieldState, Match
 from keepaway_sim.bags.gaps import count_gaps
 from keepaway_sim.bags.match_bag import MatchBag
 from keepaway_sim.bags.reader import BagReader
@@ -105,6 +106,22 @@ def test_players_with_odd_names_are_not_listened_to(graph: Graph, tmp_path: Path
     graph.spin_until(lambda: recorder.poll() > 0)
     assert recorder.gaps.topics == {}
     assert recorder.finish() == "no perception and no state was recorded"
+    recorder.destroy_node()
+
+
+def test_bytes_that_are_no_message_are_not_recorded_and_end_no_recorder(
+    graph: Graph, tmp_path: Path
+) -> None:
+    recorder = start_recorder(graph, tmp_path / "heard")
+    odd = graph.node.create_publisher(FieldState, "field_state", 10)
+    latched = graph.node.create_publisher(Match, "match", LATCHED)
+    graph.spin_until(lambda: odd.get_subscription_count() > 0)
+    odd.publish(bytes([0, 1, 0, 0, 7]))
+    latched.publish(bytes([0, 1, 0, 0, 7]))
+    taken = itertools.accumulate(iter(recorder.poll, None))
+    graph.spin_until(lambda: next(taken) == 2)
+    assert recorder.finish() == "no perception and no state was recorded"
+    assert BagReader(tmp_path / "heard").message_count == 0
     recorder.destroy_node()
 
 

@@ -7,6 +7,7 @@ between. The simulator can wait for it: `recorded` has the simulated time that i
 
 import json
 import signal
+import struct
 import sys
 import threading
 import time
@@ -196,10 +197,18 @@ class Recorder(Node):
         if topic not in self.bag.topics:
             qos = offered_qos(self, topic, default_qos(message_type))
             self.bag.add_topic(topic, message_type, qos)
-        self.gaps.feed(topic, message_type, data)
-        self.bag.write(topic, message_type, data, self._times.of(message_type, data))
-        if message_type == MATCH:
-            self._learn_players(codec(MATCH).decode(data))
+        try:
+            match = codec(MATCH).decode(data) if message_type == MATCH else None
+            log_time = self._times.of(message_type, data)
+            self.gaps.feed(topic, message_type, data)
+        except (KeepawayError, struct.error) as error:  # in a bag it would stop every reader
+            self.get_logger().warning(
+                f"{topic}: not recorded: {error}", throttle_duration_sec=LOG_PERIOD
+            )
+            return
+        self.bag.write(topic, message_type, data, log_time)
+        if match is not None:
+            self._learn_players(match)
 
     def _learn_players(self, match: Mapping[str, Any]) -> None:
         """Listen to the players that a Match names, where it makes sense."""
