@@ -40,7 +40,7 @@ def said_of(one: Evidence, measure: str, what: str) -> Lines:
     for name, row in one.rows.items():
         if (found := row.against.get(one.scratch)) is not None:
             groups[_verdict(found, measure).partition(":")[0]].append(name)
-    said = [f"{WORDS[word]} {_listed(names)}" for word, names in groups.items() if names]
+    said = [f"{WORDS[word]} {listed(names)}" for word, names in groups.items() if names]
     return [f"Against learning from scratch, {what} is {'; '.join(said)}."] if said else []
 
 
@@ -49,7 +49,8 @@ def _verdict(found: Against, measure: str) -> str:
     return verdict(comparison, getattr(found, f"{measure}_holm"))
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
+    """Some names as part of a sentence."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
