@@ -88,7 +88,10 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--runs", type=int, default=1, help="of all of it (default 1)")
     parser.add_argument("--json", action="store_true", help="print a JSON object for each run")
     parser.add_argument("--write", action="store_true", help="write the performance page")
-    return parser.parse_args()
+    args = parser.parse_args()
+    if args.only and args.write:
+        parser.error("--write needs all parts: the page holds all figures of one run")
+    return args
 
 
 def table(figures: dict[str, float]) -> str:

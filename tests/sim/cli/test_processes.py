@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 
+import psutil  # type: ignore[import-untyped]
 import pytest
 
 from keepaway_sim.cli.processes import Ended, Processes
@@ -18,10 +19,9 @@ STUBBORN = (
 
 def is_alive(pid):
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE  # which nobody may wait for
+    except psutil.NoSuchProcess:
         return False
-    return True
 
 
 def wait_until(is_so):
