@@ -85,6 +85,19 @@ def test_a_folder_holds_what_was_trained(tmp_path):
     assert not list((tmp_path / "out").glob("*.npz"))  # those of the first trial only
 
 
+@pytest.mark.parametrize(
+    "row", [b"1,2", b"1,two,taken", b"1,2,lost", b"1,%d,taken" % 10**12, b"\x80"]
+)
+def test_episodes_that_something_else_changed_are_refused_with_their_path(row, tmp_path):
+    folder = TrainingFolder(tmp_path / "out", SHORT)
+    for result in play_trials(SHORT, [0]):
+        folder.save(result)
+    with open(tmp_path / "out/trial_0000/episodes.csv", "ab") as file:
+        file.write(row + b"\n")
+    with pytest.raises(AgentError, match=r"trial_0000/episodes\.csv: not a trial's episodes"):
+        folder.episodes(0)
+
+
 def test_the_first_trials_team_lies_in_the_folder_itself_and_can_be_trained_on(tmp_path):
     first = TrainingFolder(tmp_path / "first", SHORT)
     for result in play_trials(SHORT, [0]):

@@ -224,9 +224,10 @@ def test_a_folder_without_results_is_refused(tmp_path):
         read_results(tmp_path)
 
 
-def test_a_line_that_is_no_trial_is_refused_with_its_number(tmp_path):
+@pytest.mark.parametrize("line", [b"{}\n", b"\x80\n", b"\xff\xfe{\x00}\x00\n", b"[" * 9999 + b"\n"])
+def test_a_line_that_is_no_trial_is_refused_with_its_number(line, tmp_path):
     append(tmp_path, 0)
-    with open(tmp_path / "trials.jsonl", "a") as file:
-        file.write("{}\n")
+    with open(tmp_path / "trials.jsonl", "ab") as file:
+        file.write(line)
     with pytest.raises(StudyError, match="trial on line 2"):
         read_results(tmp_path)

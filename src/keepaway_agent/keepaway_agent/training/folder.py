@@ -118,11 +118,18 @@ class TrainingFolder:
             shutil.rmtree(cut, ignore_errors=True)  # of earlier attempts; the trial is whole now
 
     def episodes(self, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """Durations [cycles] and outcomes of a trial's episodes, (num_episodes,) each."""
-        lines = (self._folder(number) / "episodes.csv").read_text(encoding="utf-8").splitlines()
-        rows = [line.split(",") for line in lines[1:]]
-        durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
-        outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
+        """Durations [cycles] and outcomes of a trial's episodes, (num_episodes,) each.
+
+        Raises:
+            AgentError: the file was changed by something else.
+        """
+        path = self._folder(number) / "episodes.csv"
+        try:
+            rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()[1:]]
+            durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
+            outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
+        except (OSError, ValueError, KeyError, OverflowError) as error:
+            raise AgentError(f"{path}: not a trial's episodes: {error!r}") from error
         return durations, outcomes
 
     def weights_hash(self, numbers: Iterable[int]) -> str:

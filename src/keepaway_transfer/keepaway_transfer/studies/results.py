@@ -121,9 +121,9 @@ def read_trials(folder: Path | str) -> Iterator[StudyTrial]:
     if not path.exists():
         return
     seen: set[tuple[str, int]] = set()
-    with path.open(encoding="utf-8") as lines:
+    with path.open("rb") as lines:
         for number, line in enumerate(lines, start=1):
-            if not line.endswith("\n"):  # it is still being written
+            if not line.endswith(b"\n"):  # it is still being written
                 continue
             trial = _trial_from(line, f"{path}, trial on line {number}")
             if trial.key not in seen:
@@ -235,9 +235,9 @@ def _read_packed(folder: Path) -> tuple[Record, ...]:
     return read_records(path) if path.exists() else ()
 
 
-def _trial_from(line: str, where: str) -> StudyTrial:
+def _trial_from(line: bytes, where: str) -> StudyTrial:
     try:
-        data = json.loads(line)
+        data = json.loads(line.decode("utf-8"))
         data["sources"] = tuple(SourceRun(**source) for source in data["sources"])
         data["cycles"], data["greedy_cycles"] = tuple(data["cycles"]), tuple(data["greedy_cycles"])
         return StudyTrial(**data)
