@@ -50,6 +50,7 @@ def build(dist: Path) -> list[str]:
         copied = dist.parent / "source" / source
         run(["cp", "-R", f"{ROOT / source}/.", str(copied)], made=copied)
         command = ["uv", "build", "--no-build-isolation", "--wheel", "--out-dir", str(dist)]
+        command += ["--python", sys.executable]  # not the one that this folder's .venv may have
         run([str(Path(sys.prefix, "bin", command[0])), *command[1:], str(copied)])
     return sorted(path.name for path in dist.glob("*.whl"))
 
