@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,14 @@ def test_frames_are_the_track_to_a_centimetre(track: Track, bag: MatchBag) -> No
     values = part(rows, "values", bag.task).reshape(count, 5, 3)
     expected = np.where(np.isnan(track.values), NO_VALUE, np.rint(10 * track.values))
     np.testing.assert_array_equal(values, expected)
+
+
+def test_what_a_page_cannot_hold_is_unknown_without_a_warning(track: Track, bag: MatchBag) -> None:
+    wild = track._replace(neck=np.full_like(track.neck, np.finfo(track.neck.dtype).max))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rows = frames(wild, bag.task)
+    assert (part(rows, "neck", bag.task) == NO_VALUE).all()
 
 
 def test_the_page_lists_all_episodes_and_holds_the_chosen_ones(

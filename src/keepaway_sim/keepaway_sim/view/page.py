@@ -58,6 +58,7 @@ def layout(task: Task) -> tuple[dict[str, int], int]:
     return dict(zip(counts, starts, strict=False)), starts[-1]
 
 
+@np.errstate(over="ignore")  # what overflows is not shown, like all that is not finite
 def frames(track: Track, task: Task) -> np.ndarray:
     """A track as the page wants it: (num_cycles, size) int16."""
     scaled = {
