@@ -150,7 +150,8 @@ def first_cycle() -> float:
         rclpy.spin_once(node, timeout_sec=0.1)
     heard.clear()
     start = time.monotonic()
-    running = subprocess.Popen(match_command("--episodes", "3"), stdout=subprocess.DEVNULL)
+    # three episodes take 0.2 s and may be over before the simulator is discovered
+    running = subprocess.Popen(match_command("--episodes", "60"), stdout=subprocess.DEVNULL)
     try:
         while not heard:
             if running.poll() is not None:
