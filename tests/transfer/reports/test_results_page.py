@@ -111,8 +111,7 @@ def compared():
 @pytest.mark.parametrize(("name", "reference"), list(compared()))
 def test_each_verdict_comes_out_again_by_scipy_alone(name, reference):
     head, trials = hours_of(name)
-    played = set(trials.index.get_level_values("row"))
-    names = [row["name"] for row in head["rows"] if row["name"] in played - {reference}]
+    names = [row["name"] for row in head["rows"] if row["name"] != reference]
     cells: dict[str, list[str]] = {row: [] for row in names}
     for measure in ("target", "total"):
         found = [by_hand(head, trials, reference, row, measure) for row in names]

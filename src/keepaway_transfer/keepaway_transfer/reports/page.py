@@ -321,7 +321,12 @@ def _never_hurts(studies: Studies) -> Lines:
         " | best total against that start (hours saved) | p over all rows | |",
         "|---|---|---|---|---|---|",
     ]
-    return lines + [_never_hurts_row(studies, name) for name in tables]
+    lines += [_never_hurts_row(studies, name) for name in tables]
+    for name in tables:
+        if (table := studies[name]) is not studies["table2"]:
+            lines += ["", f"`{name}` against scratch:", ""]
+            lines += study_table(table, table.scratch, "episodes of 3v2")
+    return lines
 
 
 def _never_hurts_row(studies: Studies, name: str) -> str:
