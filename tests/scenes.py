@@ -18,6 +18,7 @@ from keepaway_sim.world.skills import kicking, tactics
 from keepaway_sim.world.skills.prediction import ball_of, body_of, reach_ball, straight_run
 from keepaway_sim.world.state import Command, Fields, make_fields
 from keepaway_sim.world.streams import Draws
+from keepaway_sim.world.survey import survey
 
 EXACT = noiseless(profile("2005"))  # every noise and rounding off
 
@@ -135,6 +136,7 @@ class Scene:
     def look(self, name: str, *uniforms: float) -> None:
         """Let a player see the truth; `uniforms` are the random numbers that it takes."""
         self.draw(*uniforms)
+        survey(self.w, 0)
         sight.look(self.w, 0, self.index(name))
         assert self.w.random.cursor[0] == len(uniforms)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scenes import EXACT, Scene
 
-from keepaway_sim.world import hearing, memory, sight
+from keepaway_sim.world import hearing, memory, sight, survey
 from keepaway_sim.world.config import NEVER, noiseless, profile
 from keepaway_sim.world.state import DASH, KICK, NONE, Command
 
@@ -202,7 +202,7 @@ def test_the_error_of_the_own_direction_turns_everything_seen():
 def looks_at(scene: Scene, time: int) -> bool:
     """Does the first player see something new at a time of its field's life?"""
     scene.w.truth.time[0] = time
-    return bool(sight.looks_now(scene.w, 0, 0))
+    return bool(survey.looks_now(scene.w, 0, 0))
 
 
 def test_two_of_three_cycles_bring_something_new():

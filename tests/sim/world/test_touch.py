@@ -8,7 +8,7 @@ import math
 import pytest
 from scenes import Scene
 
-from keepaway_sim.world import ghosts, memory, sight, touch
+from keepaway_sim.world import ghosts, memory, touch
 from keepaway_sim.world.config import NEVER, noiseless, profile
 from keepaway_sim.world.skills import fastest, kicking, tactics
 
@@ -82,7 +82,7 @@ def test_who_is_felt_at_the_end_of_reach_becomes_nobody():
     scene.put("a", -0.9, 0.0)
     for name in "a2":
         scene.lose(name)
-    sight.look(scene.w, 0, 0)
+    scene.look("1", 0.5, 0.5, 0.5)
     assert scene.belief.age[0, 0, scene.index("a")] == NEVER
     assert slots(scene, "1") == []
 

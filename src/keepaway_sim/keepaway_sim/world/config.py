@@ -18,7 +18,7 @@ from keepaway_sim.task import MAX_FIELD_SIDE
 CYCLE_TIME = 0.1  # [s] S: simulator_step
 ROLL_CYCLES = 128  # entries of the two tables of rolling distances
 SIGHT_NEAREST, SIGHT_FARTHEST = 0.01, 200.0  # [m] range of the tables of seen distances
-SIGHT_CELLS = 8.0  # [1/m] their fineness
+SIGHT_CELLS = 32.0  # [1/m] their fineness
 SIGHT_STEP = 0.1  # [m] S: reported distances are rounded to it
 FINEST_DIRECTION = 0.01  # [deg] finest rounding of seen directions
 NEVER = 65535  # [cycles] age of what was never seen; also "cannot reach the ball"

@@ -16,6 +16,7 @@ from keepaway_sim.world.skills.fastest import fastest_keeper, nobody_asked
 from keepaway_sim.world.skills.running import expected_turn
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.streams import draw
+from keepaway_sim.world.survey import looks_now, survey
 
 _HOLD = int(Action.HOLD_BALL)
 _PASS = int(Action.PASS_BALL)
@@ -254,11 +255,12 @@ def _judge_ball(w, f):
 @compiled
 def _perceive(w, f):
     """What every player of field f makes of this cycle."""
+    survey(w, f)
     for p in range(w.num_players):
         if w.belief.cycle[f] > 0:
             remember(w, f, p)
         feel_self(w, f, p)
-        looks, chase = sight.looks_now(w, f, p), nobody_asked()
+        looks, chase = looks_now(w, f, p), nobody_asked()
         if w.belief.cycle[f] > 0 and not (looks and sight.sees_all(w)):
             chase = roll_on(w, f, p)
         if looks:

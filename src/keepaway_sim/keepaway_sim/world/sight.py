@@ -17,69 +17,55 @@ from typing import NamedTuple
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import SIGHT_CELLS
-from keepaway_sim.world.geometry import TWO_PI, bearing, length, quantize, rotated, wrap
+from keepaway_sim.world.geometry import TWO_PI, length, rotated, wrap
 from keepaway_sim.world.ghosts import forget_double, remove_ghosts
 from keepaway_sim.world.memory import stop_ball_of_opponent
 from keepaway_sim.world.streams import draw
 from keepaway_sim.world.touch import feel_players
 
-DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is rounded to it
-
-
-@compiled
-def looks_now(w, f, p):
-    """Does player p see something new in this cycle of its field's life?"""
-    period, moment = w.constants.look_period, w.truth.time[f] + w.memory.look_phase[f, p]
-    return period == 1 or moment % period != period - 1
-
 
 class Glimpse(NamedTuple):
     """What a player gets of an object it sees or only feels."""
 
-    dx: float  # true unit vector from the player to the object
-    dy: float
-    distance: float  # [m] true
-    ux: float  # the unit vector as the player believes it
+    distance: float  # [m] as reported
+    ux: float  # the unit vector from the player to the object as the player believes it
     uy: float
+    radial: float  # [1/cycle] change of distance as a share of it, as reported
+    turning: float  # [rad/cycle] change of direction, as reported
     seen: bool
     moves: bool  # is it seen how it moves?
 
 
 @compiled
 def look(w, f, p):
-    """Player p sees its surroundings and updates its belief."""
-    c, belief = w.constants, w.belief
-    position, yaw = w.truth.position[f], w.truth.yaw[f]
+    """Player p sees its surroundings, which `survey` has measured, and updates its belief."""
+    c, belief, sights = w.constants, w.belief, w.sights
     yaw_error = _look_at_self(w, f, p)
-    face = yaw[p] + belief.neck[f, p]
-    error = math.cos(yaw_error), math.sin(yaw_error)
-    believed_face = math.cos(face + yaw_error), math.sin(face + yaw_error)
+    turn = yaw_error  # from `_reported_direction` to what the player believes
+    if c.direction_step > 0.0:
+        turn = w.truth.yaw[f, p] + belief.neck[f, p] + yaw_error
+    cosine, sine = math.cos(turn), math.sin(turn)
     w.scratch.felt[:] = math.nan
     for j in range(w.ball + 1):
         if j == p:
             continue
-        dx, dy = position[j, 0] - position[p, 0], position[j, 1] - position[p, 1]
-        distance = max(length(dx, dy), 1e-6)
-        dx, dy = dx / distance, dy / distance
-        direction = wrap(bearing(dx, dy) - face)
-        seen = abs(direction) <= 0.5 * c.visible_angle
+        k = sights.first[p] + j
+        distance = sights.distance[k]
+        seen = abs(sights.direction[k]) <= 0.5 * c.visible_angle
         if not seen and distance > c.feel_distance:
             continue
-        if c.direction_step == 0.0:
-            ux, uy = rotated(dx, dy, *error)
-        else:
-            step = round(direction / c.direction_step) + len(c.direction_cosine) // 2
-            ux, uy = rotated(c.direction_cosine[step], c.direction_sine[step], *believed_face)
+        ux, uy = rotated(*_reported_direction(w, k), cosine, sine)
+        reported = _reported_distance(c, distance)
         if not seen and j < w.ball:
-            away = _reported_distance(c, distance)
-            w.scratch.felt[j, 0] = belief.position[f, p, p, 0] + away * ux
-            w.scratch.felt[j, 1] = belief.position[f, p, p, 1] + away * uy
-            w.scratch.felt[j, 2] = away
+            w.scratch.felt[j, 0] = belief.position[f, p, p, 0] + reported * ux
+            w.scratch.felt[j, 1] = belief.position[f, p, p, 1] + reported * uy
+            w.scratch.felt[j, 2] = reported
             continue
         moves = seen and _velocity_visible(w, f, distance)
-        _see(w, f, p, j, Glimpse(dx, dy, distance, ux, uy, seen, moves))
+        radial, turning = sights.radial[k], sights.turning[k]
+        _see(w, f, p, j, Glimpse(reported, ux, uy, radial, turning, seen, moves))
         if j < w.ball:
-            _recognize(w, f, p, j, wrap(yaw[j] + yaw_error), moves)
+            _recognize(w, f, p, j, wrap(w.truth.yaw[f, j] + yaw_error), moves)
     own, ball = belief.position[f, p, p], belief.position[f, p, w.ball]
     out_of_reach = length(ball[0] - own[0], ball[1] - own[1]) > c.kickable_distance
     if belief.age[f, p, w.ball] == 0 and out_of_reach:
@@ -130,31 +116,25 @@ def _look_at_self(w, f, p):
 @compiled
 def _see(w, f, p, j, glimpse):
     """What player p makes of its Glimpse of object j."""
-    c, belief = w.constants, w.belief
-    reported = _reported_distance(c, glimpse.distance)
+    c, belief, away = w.constants, w.belief, glimpse.distance
     fresh = belief.age[f, p, j] <= 1
     old_x, old_y = belief.position[f, p, j, 0], belief.position[f, p, j, 1]
-    belief.position[f, p, j, 0] = belief.position[f, p, p, 0] + reported * glimpse.ux
-    belief.position[f, p, j, 1] = belief.position[f, p, p, 1] + reported * glimpse.uy
+    belief.position[f, p, j, 0] = belief.position[f, p, p, 0] + away * glimpse.ux
+    belief.position[f, p, j, 1] = belief.position[f, p, p, 1] + away * glimpse.uy
     belief.age[f, p, j] = 0
     if glimpse.moves:
-        _see_motion(w, f, p, j, glimpse, reported)
+        _see_motion(w, f, p, j, glimpse)
     elif j == w.ball and fresh and not glimpse.seen:  # P: a felt ball's, from two positions
         belief.velocity[f, p, j, 0] += (belief.position[f, p, j, 0] - old_x) * c.ball_decay
         belief.velocity[f, p, j, 1] += (belief.position[f, p, j, 1] - old_y) * c.ball_decay
 
 
 @compiled
-def _see_motion(w, f, p, j, glimpse, reported):
+def _see_motion(w, f, p, j, glimpse):
     """How object j moves, as player p sees it."""
     c, belief, velocity = w.constants, w.belief, w.truth.velocity[f]
-    dx, dy, distance = glimpse.dx, glimpse.dy, glimpse.distance
-    wx, wy = velocity[j, 0] - velocity[p, 0], velocity[j, 1] - velocity[p, 1]
-    radial = reported * quantize((wx * dx + wy * dy) / distance, c.change_step)
-    turning = (dx * wy - dy * wx) / distance
-    if c.change_step > 0.0:
-        turning = quantize(turning, DIRECTION_CHANGE_STEP)
-    rel_vx, rel_vy = rotated(radial, reported * turning, glimpse.ux, glimpse.uy)
+    radial, across = glimpse.distance * glimpse.radial, glimpse.distance * glimpse.turning
+    rel_vx, rel_vy = rotated(radial, across, glimpse.ux, glimpse.uy)
     vx, vy = velocity[p, 0] + rel_vx, velocity[p, 1] + rel_vy
     if j == w.ball:
         vx, vy = _blended(c, vx, vy, belief.velocity[f, p, j, 0], belief.velocity[f, p, j, 1])
@@ -163,11 +143,22 @@ def _see_motion(w, f, p, j, glimpse, reported):
 
 
 @compiled
+def _reported_direction(w, k):
+    """Pair k's unit vector: as it is, or rounded as the server reports it, then from the view."""
+    c, sights = w.constants, w.sights
+    if c.direction_step == 0.0:
+        return sights.dx[k], sights.dy[k]
+    step = int(sights.steps[k]) + len(c.direction_cosine) // 2
+    return c.direction_cosine[step], c.direction_sine[step]
+
+
+@compiled
 def _reported_distance(c, distance):
     """The distance as the server reports it, see `config._sight_tables`."""
     if c.quantize_step == 0.0:
         return distance
     edge = c.sight_first[min(int(distance * SIGHT_CELLS), len(c.sight_first) - 1)]
+    edge += distance >= c.sight_edge[edge]  # few cells have more edges than one
     while distance >= c.sight_edge[edge]:
         edge += 1
     return c.sight_value[edge]

@@ -8,6 +8,7 @@ last player. No array of a record is ever replaced, only written into.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from keepaway_sim.world.config import NEVER
 from keepaway_sim.world.passing import record
 from keepaway_sim.world.streams import Draws
 
+SIGHT_LANES = 8  # pairs that one instruction may serve
 NONE, DASH, TURN, KICK = 0.0, 1.0, 2.0, 3.0  # kinds of commands
 
 
@@ -123,6 +125,20 @@ class Discs(NamedTuple):
 
 
 @record
+class Sights(NamedTuple):
+    """What the server measures for a field's players who look, by pair (N pairs), see `survey`."""
+
+    first: np.ndarray  # (P,) int64 by player: its pair with the first object
+    dx: np.ndarray  # (N,) unit vector from the player to the object
+    dy: np.ndarray
+    distance: np.ndarray  # (N,) [m]
+    direction: np.ndarray  # (N,) [rad] from the middle of the player's view
+    steps: np.ndarray  # (N,) the same in steps, a whole number: the direction that is sent
+    radial: np.ndarray  # (N,) [1/cycle] change of distance as a share of it, as it is sent
+    turning: np.ndarray  # (N,) [rad/cycle] change of direction, as it is sent
+
+
+@record
 class Scratch(NamedTuple):
     """Room to calculate in: nothing in it outlives the cycle of one field."""
 
@@ -149,6 +165,7 @@ class Fields(NamedTuple):
     speech: Speech
     bodies: Discs
     random: Draws  # a stream for each field
+    sights: Sights
     scratch: Scratch
 
 
@@ -167,6 +184,7 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
         speech=_make_speech(num_fields, num_players),
         bodies=bodies,
         random=random,
+        sights=_make_sights(num_players),
         scratch=Scratch(
             acceleration=np.zeros((objects, 2)),
             pushed_to=np.zeros((objects, 2)),
@@ -177,6 +195,14 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
             numbers=np.zeros((num_players, 2), dtype=np.int64),
         ),
     )
+
+
+def _make_sights(num_players: int) -> Sights:
+    """Rows for all pairs, and some more, up to a multiple of SIGHT_LANES."""
+    num_pairs = num_players * (num_players + 1)
+    length = math.ceil(num_pairs / SIGHT_LANES) * SIGHT_LANES
+    first = np.zeros(num_players, dtype=np.int64)
+    return Sights(first, *(np.zeros(length) for _ in Sights._fields[1:]))
 
 
 def _make_truth(num_fields: int, num_players: int) -> Truth:
