@@ -20,7 +20,7 @@ from keepaway_sim.world.machine_code import SOURCES, sources
 
 SIM, AGENT = SRC / "keepaway_sim" / "keepaway_sim", SRC / "keepaway_agent" / "keepaway_agent"
 MECHANISM = ("compiled.py", "machine_code.py", "passing.py")
-DECORATORS = {"compiled", "compiled_apart", "compiled_with_arrays"}
+DECORATORS = {"compiled", "compiled_apart"}
 UNCOMPILED = {"errors", "settings"}  # nothing in them ends up in machine code
 OLD = 1_000_000_000  # a time stamp of 2001
 

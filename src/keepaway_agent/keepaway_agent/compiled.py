@@ -39,7 +39,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
-from .machine_code import BareCache, SharedCache, cache_folder
+from .machine_code import SharedCache, cache_folder
 
 _SETTINGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -66,11 +66,6 @@ def compiled_apart(function: Callable[..., Any]) -> Any:
     """Compile a function of its own: an entry point."""
     settings: dict[str, Any] = {"pipeline_class": _EntryCompiler, "no_cfunc_wrapper": True}
     return _kept(njit(**settings, **_SETTINGS)(function))
-
-
-def compiled_with_arrays(function: Callable[..., Any]) -> Any:
-    """Compile a function of its own that makes arrays: they are reference-counted."""
-    return _kept(njit(pipeline_class=_EntryCompiler)(function))
 
 
 class Kernel:
@@ -314,7 +309,5 @@ class _EntryCompiler(_InnerCompiler):
 def _kept(dispatcher: Any) -> Any:
     """Let a compiled function keep its machine code on disk, if there is a place for it."""
     if hasattr(dispatcher, "py_func") and cache_folder() is not None:  # not with DISABLE_JIT
-        counts_references = dispatcher.targetoptions.get("_nrt", True)
-        kind = SharedCache if counts_references else BareCache
-        dispatcher._cache = kind(dispatcher.py_func)
+        dispatcher._cache = SharedCache(dispatcher.py_func)
     return dispatcher

@@ -30,8 +30,7 @@ def compile_ahead() -> None:
         _make_players()
     jobs: list[Any] = [*world, *players]  # both packages have the same class
     agent.make(jobs)
-    index_records(np.zeros(0, np.uint8))
-    index_records(np.zeros(0, np.uint8), True)
+    index_records(np.frombuffer(b"", np.uint8))
 
 
 def load_for_match() -> None:

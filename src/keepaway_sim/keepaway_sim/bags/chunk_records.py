@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from keepaway_sim.world.compiled import compiled, compiled_with_arrays
+from keepaway_sim.world.compiled import compiled, compiled_apart
 
 
-@compiled_with_arrays
-def index_records(data, is_loose=False):
+def index_records(data, is_loose=False):  # type: ignore[no-untyped-def]
     """Where the records in a chunk are, or those that stand outside chunks.
+
+    Args:
+        data: (n,) uint8.
+        is_loose: they stand outside chunks.
 
     Returns:
         (n, 4) int64 of messages: channel, log time, first and last byte of the payload;
@@ -18,6 +21,16 @@ def index_records(data, is_loose=False):
         whether the records up to there are whole. Outside chunks, reading ends with a record of
         another kind, or with one that is not all in the data.
     """
+    num_messages, num_definitions, end, is_whole = _count(data, is_loose)
+    messages = np.empty((num_messages, 4), np.int64)
+    definitions = np.empty((num_definitions, 3), np.int64)
+    _locate(data, end, messages, definitions)
+    return messages, definitions, end, is_whole
+
+
+@compiled_apart
+def _count(data, is_loose):
+    """How many messages, and schemas and channels there are; up to where; is it all whole?"""
     num_messages, num_definitions, end, is_whole = 0, 0, 0, True
     while end + 9 <= len(data):
         opcode, length = data[end], _unsigned(data, end + 1, 8)
@@ -29,8 +42,12 @@ def index_records(data, is_loose=False):
         num_messages += opcode == 5
         num_definitions += opcode == 3 or opcode == 4
         end += 9 + length
-    messages = np.empty((num_messages, 4), np.int64)
-    definitions = np.empty((num_definitions, 3), np.int64)
+    return num_messages, num_definitions, end, is_whole
+
+
+@compiled_apart
+def _locate(data, end, messages, definitions):
+    """Fill in the arrays for the records before `end`."""
     position, m, d = 0, 0, 0
     while position < end and position + 9 <= len(data):
         opcode, body = data[position], position + 9
@@ -43,7 +60,6 @@ def index_records(data, is_loose=False):
         elif opcode == 3 or opcode == 4:
             definitions[d, 0], definitions[d, 1], definitions[d, 2] = opcode, body, position
             d += 1
-    return messages, definitions, end, is_whole
 
 
 @compiled

@@ -145,17 +145,13 @@ class _SharedCacheImpl(CompileResultCacheImpl):
 
 
 class SharedCache(FunctionCache):
-    """Keeps a function's machine code in the folder of these sources."""
+    """Keeps a function's machine code in the folder of these sources.
+
+    Before it loads machine code numba loads all that it may compile with, half of scipy among it,
+    which takes longer. Our functions need nothing of numba to run, so none of that is loaded here.
+    """
 
     _impl_class = _SharedCacheImpl
-
-
-class BareCache(SharedCache):
-    """The same for functions that need nothing of numba to run.
-
-    Numba first loads all that it may compile with, half of scipy among it, which takes longer than
-    loading the code. Where there is none on disk, compiling does so itself.
-    """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What is kept for these types; None: nothing is."""
