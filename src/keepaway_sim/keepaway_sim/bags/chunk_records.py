@@ -7,7 +7,9 @@ import numpy as np
 from keepaway_sim.world.compiled import compiled, compiled_apart
 
 
-def index_records(data, is_loose=False):  # type: ignore[no-untyped-def]
+def index_records(
+    data: np.ndarray, is_loose: bool = False
+) -> tuple[np.ndarray, np.ndarray, int, bool]:
     """Where the records in a chunk are, or those that stand outside chunks.
 
     Args:
