@@ -135,30 +135,18 @@ def echo(player: int) -> None:
 
 
 def first_cycle() -> float:
-    """Seconds from the start of `match.py` until `/clock` shows that a cycle has been played."""
+    """Seconds from the start of `match.py` until its simulator reports that it begins."""
     os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
-    import rclpy
-    from rosgraph_msgs.msg import Clock
+    from keepaway_sim.match.conductor import BEGINS
 
-    rclpy.init()
-    node = rclpy.create_node("first_cycle", enable_rosout=False, start_parameter_services=False)
-    heard: list[float] = []
-    node.create_subscription(Clock, "/clock", lambda _: heard.append(time.monotonic()), 10)
-    match("--episodes", "1")  # compiles, if need be
-    until = time.monotonic() + 1.0
-    while time.monotonic() < until:  # take in all that this match published
-        rclpy.spin_once(node, timeout_sec=0.1)
-    heard.clear()
+    command = match_command("--episodes", "1")
+    subprocess.run(command, capture_output=True, check=True)  # compiles, if need be
     start = time.monotonic()
-    # three episodes take 0.2 s and may be over before the simulator is discovered
-    running = subprocess.Popen(match_command("--episodes", "60"), stdout=subprocess.DEVNULL)
-    try:
-        while not heard:
-            if running.poll() is not None:
-                raise RuntimeError(f"the match ended with {running.returncode} before a cycle")
-            rclpy.spin_once(node, timeout_sec=0.1)
-        return heard[0] - start
-    finally:
-        running.wait(300)
-        node.destroy_node()
-        rclpy.shutdown()
+    with subprocess.Popen(
+        [*command, "--verbose"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as running:
+        assert running.stdout
+        begun = [time.monotonic() for line in running.stdout if BEGINS in line]
+    if running.returncode or not begun:
+        raise RuntimeError(f"the match ended with {running.returncode}, begun: {bool(begun)}")
+    return begun[0] - start

@@ -9,7 +9,7 @@ import pytest
 
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.beginning import begin_match
-from keepaway_sim.match.conductor import Conductor
+from keepaway_sim.match.conductor import BEGINS, Conductor
 from keepaway_sim.match.reporting import LONG_WAIT
 from keepaway_sim.match.settings import MatchSettings
 from keepaway_sim.task import Action, Outcome, Task
@@ -171,9 +171,11 @@ def test_nothing_is_played_until_everybody_is_there() -> None:
     stage.play(until=lambda: stage.now > 2 * LOG_PERIOD)
     assert stage.published == []
     assert "waits for keeper_3" in stage.reports
+    assert BEGINS not in stage.reports
     assert stage.match.start() == "waits for keeper_3"
     stage.arrive(2)
     stage.play()
+    assert stage.reports.count(BEGINS) == 1
     assert len(stage.ended()) == 1
 
 

@@ -28,6 +28,7 @@ from keepaway_sim.world.world import World
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again
 MARKER_PERIOD = 0.1  # [s] viewers are not sent more
 ARRIVAL = 10.0  # [s] after its start in which a simulator that finds another one refuses to play
+BEGINS = "begins: all players are ready"
 FAREWELL = 2.0  # [s] at most, for the players to take in the end of the last episode
 
 Spin = Callable[[float], None]
@@ -263,6 +264,7 @@ class Conductor:
         self._has_begun = True
         self._first_counts = {p: s["episodes"] for p, s in self._statuses.items()}
         self._record_statuses()
+        self._report.info(BEGINS)
         self.on_begin()
 
     def _let_recorders_follow(self) -> None:
