@@ -86,6 +86,8 @@ def ping_pong(num_players: int, cycles: int) -> float:
                 while len(answered) < num_players and time.perf_counter() < until:
                     executor.spin_once(timeout_sec=0.5)
                 missing = [p for p in range(num_players) if p not in answered]
+                if ended := [player for player in players if player.poll() is not None]:
+                    raise RuntimeError(f"a player ended with {ended[0].returncode}")
         return cycles / (time.perf_counter() - start)
     finally:
         for player in players:
