@@ -186,7 +186,7 @@ class Intruders:
         )
 
     def disturb(self, number: int) -> None:
-        """Publish an episode that nobody played."""
+        """Publish an episode that was never played."""
         self._episodes.publish(Episode(number=number, cycles=10_000, duration=1000.0))
 
     def check(self) -> None:

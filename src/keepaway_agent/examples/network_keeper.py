@@ -2,7 +2,7 @@
 
 Put it into a match with `match.py --keeper-agent`.
 
-It sees where everybody stands as seen from itself, chooses between holding the ball and passing
+It sees where all players stand as seen from itself, chooses between holding the ball and passing
 to one of its team-mates in match order, and is paid 1 for every second until it chooses again.
 """
 
@@ -17,7 +17,7 @@ FORGOTTEN = 100  # [cycles] an older perception is no worse
 GAMMA = 0.99  # discount per cycle
 EPSILON = 0.05  # share of random choices
 CONFIG = NetworkConfig(learn_after=100, train_every=2, copy_every=200)
-EVERYBODY = np.ones(1, dtype=np.bool_)
+ALL_FIELDS = np.ones(1, dtype=np.bool_)
 
 
 class NetworkKeeper(SmallestAgent):
@@ -66,10 +66,10 @@ class NetworkKeeper(SmallestAgent):
         num_cycles = seen.cycle - cycle
         paid = np.array([self.match.cycle_time * (1 - GAMMA**num_cycles) / (1 - GAMMA)])
         after = np.array([discount**num_cycles])
-        self.networks.learn(EVERYBODY, state, choice, paid, after, self.state(seen))
+        self.networks.learn(ALL_FIELDS, state, choice, paid, after, self.state(seen))
 
     def state(self, seen: Perception) -> np.ndarray:
-        """(1, 3 * num_players): everybody's place from here, and how sure it is."""
+        """(1, 3 * num_players): every player's place from here, and how sure it is."""
         places = np.reshape(seen.positions, (-1, 2))[:-1]
         ages = np.minimum(seen.ages[:-1], FORGOTTEN) / FORGOTTEN
         own = np.nan_to_num((places - places[self.index]) / SCALE)

@@ -3,7 +3,7 @@
 Numba passes a named tuple as one argument for each of its numbers. `Fields` has a thousand, and
 most functions take it: half the time to compile went into writing down such calls. A tuple class
 marked `@record` is passed as one pointer instead. An entry point copies what it is given; once all
-functions are compiled into it LLVM sees that nobody changes the copy, and no pointer is left.
+functions are compiled into it LLVM sees that nothing changes the copy, and no pointer is left.
 Compiled functions can read the fields of a record by name, and nothing else.
 
 Each package has this same file, see `compiled.py`.

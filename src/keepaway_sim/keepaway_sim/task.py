@@ -12,7 +12,7 @@ from keepaway_sim.settings import setting
 
 MAX_TEAM_SIZE = 11  # a soccer team; the soccer server knows no larger one
 MIN_FIELD_SIDE = 10.0  # [m] below this the kick-off corners (3 m) and the ball's place overlap
-MAX_FIELD_SIDE = 100.0  # [m] about the soccer server's pitch; beyond it players see nobody
+MAX_FIELD_SIDE = 100.0  # [m] about the soccer server's pitch; beyond it players see no others
 FIELD_SIDES = f"[{MIN_FIELD_SIDE:g}, {MAX_FIELD_SIDE:g}]"
 
 

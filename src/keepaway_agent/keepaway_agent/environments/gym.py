@@ -288,7 +288,7 @@ def _books(num_fields: int) -> KeeperBooks:
 
 
 class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
-    """One field, from choice to choice of whichever keeper has it; see `KeeperVectorEnv`."""
+    """One field, from choice to choice of the keeper that has the ball; see `KeeperVectorEnv`."""
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
         "render_modes": ["rgb_array", "rgb_array_list", "human"],

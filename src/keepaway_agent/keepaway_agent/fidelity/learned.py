@@ -37,7 +37,7 @@ class Held(NamedTuple):
     cycle: np.ndarray  # (num_rows,) int64
     keeper: np.ndarray  # (num_rows,) int64
     passes: np.ndarray  # (num_rows,) bool: it passes in this cycle; else it holds
-    looked: np.ndarray  # (num_rows,) bool: it sees everybody in this cycle
+    looked: np.ndarray  # (num_rows,) bool: it sees all players in this cycle
     believed: np.ndarray  # (num_rows, 1 + num_takers) [m] to the centre, T1, T2.. as it believes
     true: np.ndarray  # (num_rows, 1 + num_takers) [m] the same in truth
 

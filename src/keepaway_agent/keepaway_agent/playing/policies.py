@@ -48,7 +48,7 @@ TAKER_POLICIES: Final = {"random": RANDOM, "hand": HAND, "learn": LEARN, "greedy
 MAX_KNOWN_AGE: Final = 12
 """A player last perceived more cycles ago has no known position (confidence 0.88)."""
 TAKER_DECISION_INTERVAL: Final = 5
-"""Cycles between two choices of a learning or random taker. One cycle moves nobody: a choice must
+"""Cycles between two choices of a learning or random taker. One cycle moves none: a choice must
 last for a while before it makes a difference that can be learned."""
 
 KEEPER_REWARD: Final = 1.0  # for every cycle that the ball stays in play
@@ -282,7 +282,7 @@ def most_open_keeper(player, view):
     """The keeper with the fewest takers in the pass lane to it; -1: none known.
 
     The lanes begin at the keeper who is believed to reach the ball first: the holder, or the
-    receiver while the ball flies. The lane to that one itself has no length, so nobody is in it.
+    receiver while the ball flies. The lane to that one itself has no length, so no player is in it.
     The first of equal ones. The deciding taker counts too, as in UT Austin's framework.
     """
     origin = passing_keeper(player, view)

@@ -54,7 +54,7 @@ class Trainer:
         """Lay out the fields and make room for the learners.
 
         Raises:
-            KeepawayError, AgentError: settings with which nobody can play.
+            KeepawayError, AgentError: settings with which no player can play.
         """
         task = config.task
         self.config, self.progress = config, Progress()

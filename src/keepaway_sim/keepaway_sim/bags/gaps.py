@@ -2,7 +2,7 @@
 
 Perceptions and field states are stamped with simulated time and come once a cycle, so a step of
 their stamps by more than one cycle names what is missing. A request is missed if a decision was
-due and nobody answered, an episode's end if it ended and no Episode message came. A match begins
+due and no answer came, an episode's end if it ended and no Episode message came. A match begins
 at time 0: a recording that was joined to one that was running is counted from the first cycle in
 which every topic was received, and its report says which.
 
@@ -83,7 +83,7 @@ class GapCounter:
         unanswered: by player index, decisions that were due and never answered.
         problems: of the recording's files, in words.
         repeated: messages that came again, besides those of `topics`.
-        silent: topics of requests of which nothing came, where nobody knows what was due.
+        silent: topics of requests of which nothing came, where what was due is unknown.
         match_id: of the match that is counted; 0: none is known, and all messages are counted.
         strange: messages of other matches on the same topics, which are not counted.
     """
@@ -99,7 +99,7 @@ class GapCounter:
     _open: dict[int, dict[tuple[int, int], bool]] = field(default_factory=dict)
     _newest: tuple[int, int] = (-1, -1)  # episode and cycle of the last perception
     _begun: set[int] = field(default_factory=set)  # episodes of which something came
-    _told: set[int] = field(default_factory=set)  # episodes whose ends were told
+    _reported: set[int] = field(default_factory=set)  # episodes whose ends were published
     _ended: set[int] = field(default_factory=set)  # episodes whose last moment came
 
     def expect(self, topic: str) -> None:
@@ -112,7 +112,7 @@ class GapCounter:
             self.strange += 1
             return
         if message_type == EPISODE:
-            self._told.add(int(codec(EPISODE).decode(data)["number"]))
+            self._reported.add(int(codec(EPISODE).decode(data)["number"]))
         if message_type not in _EVERY_CYCLE:
             return
         about = read_head(message_type, data)
@@ -148,7 +148,7 @@ class GapCounter:
     def tell_ends(self, bag: MatchBag) -> None:
         """Count the Episode messages of a bag's match, and those that came again."""
         self.repeated += bag.found.repeated
-        self._told |= {int(entry["number"]) for entry in bag.found.episodes}
+        self._reported |= {int(entry["number"]) for entry in bag.found.episodes}
 
     @property
     def received(self) -> int:
@@ -185,7 +185,7 @@ class GapCounter:
         """Numbers of the episodes that ended and of whose end no Episode message came."""
         newest = max(self._begun, default=-1)
         over = self._ended | {number for number in self._begun if number < newest}
-        return sorted(over - self._told)
+        return sorted(over - self._reported)
 
     def is_complete(self) -> bool:
         """Whether nothing is missing that the match must have made."""
@@ -273,7 +273,7 @@ def gap_counter(bag: MatchBag) -> GapCounter:
     counter.strange = bag.found.strange
     counts = bag.found.counts
     for seen, asked in zip(*map(bag.player_topics, ("perception", "action_request")), strict=True):
-        if not counts.get(seen) and not counts.get(asked):  # nobody knows what was due
+        if not counts.get(seen) and not counts.get(asked):  # what was due is unknown
             counter.silent.append(asked)
     return counter
 

@@ -34,11 +34,11 @@ class EpisodeSummary(NamedTuple):
     cycles: int
     duration: float  # [s]
     outcome: Outcome
-    lost_by: int  # player index; -1 nobody
+    lost_by: int  # player index; -1 none
 
 
 def episode_summary(entry: np.void) -> EpisodeSummary:
-    """What an Episode message tells."""
+    """What an Episode message contains."""
     end = int(checked.stamps_of(np.array([entry]))[0])
     cycles = int(entry["cycles"])
     return EpisodeSummary(
@@ -65,7 +65,7 @@ class Track(NamedTuple):
     velocity: np.ndarray  # (T, P + 1, 2) [m/s] truth
     yaw: np.ndarray  # (T, P) [rad] truth
     neck: np.ndarray  # (T, P) [rad]
-    action: np.ndarray  # (T, P) what everybody does
+    action: np.ndarray  # (T, P) what every player does
     target: np.ndarray  # (T, P)
     believed: np.ndarray  # (T, P, P + 1, 2) [m] where each player believes every object
     age: np.ndarray  # (T, P, P + 1) [cycles] how old that is

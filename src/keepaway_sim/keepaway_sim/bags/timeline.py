@@ -29,7 +29,7 @@ _STAMPED = (PERCEPTION, FIELD_STATE, EPISODE, CLOCK)
 
 
 class OwnTimes:
-    """Tells when each message of a match was said, simulated [ns], as they come."""
+    """Finds when each message of a match was published, simulated [ns], as they come."""
 
     def __init__(self) -> None:
         """Nothing was said yet."""

@@ -82,7 +82,7 @@ class Processes:
     def split_off(self, name: str, command: Sequence[str], run: Callable[[], object]) -> None:
         """Start one as a copy of this process, in which `run` is called.
 
-        To everybody else it is as if `command` had been started: its arguments, its name in the
+        To other processes it is as if `command` had been started: its arguments, its name in the
         list of processes, its exit code.
 
         Args:

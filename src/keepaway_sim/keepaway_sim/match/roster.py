@@ -59,7 +59,7 @@ class Roster:
     """
 
     def __init__(self, task: Task, config: Config, match_id: int = 0) -> None:
-        """Everybody is absent; messages of players of another match are rejected."""
+        """All players are absent; messages of players of another match are rejected."""
         self.seats = [Seat(name) for name in task.player_names]
         self.num_awaited = 0
         self._task, self._match_id = task, match_id

@@ -62,7 +62,7 @@ class Bodies:
             return
         size = self._size(num_asked)
         space = self._spaces.get(size) or self._spaces.setdefault(size, _Space(discs, size))
-        discs.motion[num_asked:size, :, 2:] = 0.0  # slots of nobody rest
+        discs.motion[num_asked:size, :, 2:] = 0.0  # empty slots rest
         touching = space.move()
         discs.touched[discs.asked[touching[touching < num_asked]]] = True
 

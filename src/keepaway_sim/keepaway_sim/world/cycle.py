@@ -298,7 +298,7 @@ def _judge(w, f, p, chase):
 def _goes_on_passing(w, f, p):
     """Does a pass that player p asked for, or continued, a cycle ago need another kick?
 
-    P keeperWithBall: until the ball has left reach nobody is asked again. A keeper that has lost
+    P keeperWithBall: until the ball has left reach no other choice is made. A keeper that has lost
     sight of a player forgets the pass.
     """
     c, belief = w.constants, w.belief

@@ -167,7 +167,7 @@ def _remove_ghost_ball(w, f, p):
 
 @compiled
 def _holder(w, f, p):
-    """The opponent believed with the ball; -1: nobody is so near to it."""
+    """The opponent believed with the ball; -1: none is so near to it."""
     holder = nearest_opponent_to_ball(w, f, p)
     if holder < 0:
         return -1

@@ -1,6 +1,6 @@
 """What players say to their team, and what they make of what they hear.
 
-Players also say where they themselves are about to be, but nobody learns of it: P decodes a message
+Players also say where they themselves are about to be, but none learns of it: P decodes a message
 as if the listener had said it (WorldModelUpdate.cc: processPlayerMessage gives the decoder the own
 number), and where it is itself a player knows better (processPerfectHearInfo). So it is left out.
 """

@@ -132,13 +132,13 @@ def toward(x, y, to_x, to_y, size):
 
 @compiled
 def stop_ball_of_opponent(w, f, p):
-    """P: a ball within an opponent's reach is believed to lie still; nobody knows his plans."""
+    """P: a ball within an opponent's reach is believed to lie still; his plans are unknown."""
     _stop_ball(w, f, p, nearest_opponent_to_ball(w, f, p))
 
 
 @compiled
 def _stop_ball(w, f, p, holder):
-    """Believe that the ball lies still if it is within this opponent's reach; -1: nobody's."""
+    """Believe that the ball lies still if it is within this opponent's reach; -1: none."""
     position, velocity, ball = w.belief.position[f, p], w.belief.velocity[f, p], w.ball
     if holder < 0:
         return

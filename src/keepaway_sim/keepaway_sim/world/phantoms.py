@@ -1,10 +1,10 @@
 """Opponents in whom a player with a limited view believes, though the match has no such number.
 
-P has eleven opponents' slots whatever the match. A felt player that can be nobody else is put into
+P has eleven opponents' slots whatever the match. A felt player that can be no known one is put into
 the first empty one (P WorldModelUpdate.cc: mapUnknownPlayers), so it may get a number that no
 opponent has, and then counts as an opponent until it is forgotten. Such a phantom has no name,
-body direction or velocity. Its index follows the ball's. All round nobody is only felt, and there
-are no slots for phantoms.
+body direction or velocity. Its index follows the ball's. With a view all round no player is only
+felt, and there are no slots for phantoms.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def yaw_of(w, f, p, j):
 
 @compiled
 def unknown_yaw(w, p):
-    """What player p takes for the body direction of somebody of whom it knows none [rad]."""
+    """What player p takes for the body direction of a player of whom it knows none [rad]."""
     return UNKNOWN_BODY if p < w.constants.num_keepers else UNKNOWN_BODY - math.pi
 
 

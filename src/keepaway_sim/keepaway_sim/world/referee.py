@@ -64,7 +64,7 @@ def next_take_count(count, keeper_near, taker_near):
     """The take counter after one cycle.
 
     A cycle with a taker near adds one, also when a keeper is near as well; a cycle with only
-    keepers near clears it; a cycle with nobody near leaves it.
+    keepers near clears it; a cycle with no player near leaves it.
     """
     if taker_near:
         return count + 1

@@ -1,6 +1,6 @@
 """What a player with a limited view makes of the players whom it only feels.
 
-Within 3 m a player is felt all round, but only as a player: nobody knows who it is (S
+Within 3 m a player is felt all round, but only as a player: not which one (S
 visualsenderplayer.cpp). Its place in the message tells something of that (P WorldModelUpdate.cc:
 processLastSeeMessage), where it is tells the rest (mapUnknownPlayers). Simplified against P: there
 are no phantoms among the team-mates.
@@ -28,12 +28,12 @@ from keepaway_sim.world.phantoms import (
 )
 
 SPARE_WAY = 2.0  # [m] P: beyond what it may have run at full speed, because of noise
-FAR_FROM_ALL = 10.0  # [m] P: so much beyond that, it is surely somebody else
+FAR_FROM_ALL = 10.0  # [m] P: so much beyond that, it is surely another player
 
 
 @compiled
 def feel_players(w, f, p):
-    """Player p makes something of everybody whom it feels in this look (`scratch.felt`)."""
+    """Player p makes something of every player whom it feels in this look (`scratch.felt`)."""
     felt, numbers = w.scratch.felt, w.scratch.numbers
     for j in range(w.num_players):
         if not math.isnan(felt[j, 0]):
@@ -79,7 +79,7 @@ def feel_somebody(w, f, p, felt, low, high):
     """Player p feels a player whose number is one of low..high.
 
     Where only one is possible it is that one. Else it is who is expected nearest to there, if it
-    can have come there; and if nobody can, an opponent of whom nothing is known. Where both teams
+    can have come there; and if none can, an opponent of whom nothing is known. Where both teams
     are possible the last is believed of near ones only.
 
     Args:

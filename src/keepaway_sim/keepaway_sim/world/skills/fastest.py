@@ -95,7 +95,7 @@ def fastest_to_ball(w, f, p, first, last, ball, limit):
         limit: the last cycle from now that is looked at.
 
     Returns:
-        the player (-1: nobody), how many cycles from now it meets the ball, how many it needs.
+        the player (-1: none), how many cycles from now it meets the ball, how many it needs.
         Of two who arrive in the same cycle the faster needs fewer cycles, then has the lower index.
     """
     c = w.constants
@@ -168,7 +168,7 @@ def fastest_to_point(w, f, p, first, last, x, y):
 class Chase(NamedTuple):
     """Which opponent reaches the ball first, as a player worked it out, and from what."""
 
-    player: int  # -1: nobody
+    player: int  # -1: none
     when: int  # [cycles] from now it meets the ball
     needed: int  # [cycles] it needs to there
     ball: Ball
@@ -194,7 +194,7 @@ def fastest_keeper(w, f, p, chase):
     """The keeper who reaches the ball first, as player p believes, and the cycles it needs.
 
     P: where a taker is sooner at the ball, keepers ask who of them is soonest at that place.
-    Takers only ask who of the keepers is first. (-1, NEVER) where nobody is known, or where it is
+    Takers only ask who of the keepers is first. (-1, NEVER) where none is known, or where it is
     a phantom, which no perception can name.
 
     Args:
@@ -227,7 +227,7 @@ def _opponents(w, p):
 
 @compiled
 def _horizon(w):
-    """The last cycle from now in which somebody is looked for at the ball."""
+    """The last cycle from now in which a player is searched for at the ball."""
     return 2 * w.constants.intercept_horizon - 1
 
 
