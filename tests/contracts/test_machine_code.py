@@ -300,10 +300,13 @@ def test_functions_of_both_packages_are_compiled_side_by_side_and_once(checkout:
 
 
 @pytest.mark.parametrize("before", [False, True])
-def test_coverage_is_imported_only_where_it_measures(before: bool) -> None:
+@pytest.mark.parametrize(
+    "module", ["keepaway_agent.compiled", "keepaway_agent.passing", "keepaway_sim.world.passing"]
+)
+def test_coverage_is_imported_only_where_it_measures(before: bool, module: str) -> None:
     """It takes a seventh of the time that a node's imports take, and can be imported later."""
     first = "import coverage; " if before else ""
-    code = f"{first}import sys, keepaway_agent.compiled; print('coverage' in sys.modules)"
+    code = f"{first}import sys, {module}; print('coverage' in sys.modules)"
     again = "; import coverage; from numba.misc import coverage_support as numbas"
     shown = "; print(numbas.coverage_available, coverage.__name__)"
     command = [sys.executable, "-c", code + again + shown]

@@ -14,6 +14,9 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
+from . import compiled  # noqa: F401  # before numba, which it lets import less
+
+# isort: split
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel.models import PrimitiveModel
