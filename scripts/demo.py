@@ -36,8 +36,6 @@ from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
 from keepaway_transfer import metrics
-from keepaway_transfer.reports import plotting
-from keepaway_transfer.reports.statistics import mean_and_error, mean_curve
 from keepaway_transfer.rho import Transfer, transferred
 from keepaway_transfer.studies.processes import WorkerExecutor
 
@@ -266,6 +264,9 @@ def learn_4v3(args: Args, starts: Sequence[np.ndarray | None], label: str) -> li
 
 def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
     """Draw the learning curves."""
+    from keepaway_transfer.reports import plotting
+    from keepaway_transfer.reports.statistics import mean_curve
+
     hours = np.linspace(0.1, args.target_hours * 0.98, 60)
     curves = {}
     for label, trials in groups.items():
@@ -282,6 +283,9 @@ def table(
     learned: dict[str, Any], moved: dict[str, Any], groups: dict[str, list[np.ndarray]]
 ) -> str:
     """What came out, a row each; errors are by trial, and a match is but one."""
+    # Here, because the matches and a refusal need no statistics: importing them takes seconds.
+    from keepaway_transfer.reports.statistics import mean_and_error
+
     rows = [f"{'what':48s} {'held (s)':>9s} {'+-':>5s}"]
 
     def add(label: str, mean: float, error: float | None) -> None:

@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
@@ -222,7 +221,9 @@ def error_of_trials(episodes: Episodes) -> float | None:
     Episodes of one learner depend on each other, so its trial counts once.
     """
     means = [durations.mean() * CYCLE_TIME for durations, _ in episodes.values()]
-    return float(stats.sem(means)) if len(means) > 1 else None
+    if len(means) < 2:
+        return None
+    return float(np.std(means, ddof=1) / np.sqrt(len(means)))
 
 
 def in_words(training: Training, numbers: dict[str, Any]) -> str:
