@@ -5,16 +5,14 @@ variable without leaving anything out (`draw_values`); and where on the field wh
 out best is shown on scenes in which one taker is put everywhere in turn (`draw_preferences`).
 """
 
+from __future__ import annotations
+
 import itertools
 import math
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from keepaway_agent.actions import Role
 from keepaway_agent.learning.cmac import NUM_TILINGS, action_values, state_cells
@@ -26,6 +24,10 @@ from keepaway_agent.learning.features import (
     taker_state,
 )
 from keepaway_agent.learning.weights import LearnedWeights
+
+if TYPE_CHECKING:  # half of what describing in words would import
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINE_COLOURS: Final = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9", "#444444")
 """Okabe and Ito's, which colour-blind people can tell apart; the first is the first action's."""
@@ -80,6 +82,8 @@ def describe(weights: LearnedWeights) -> str:
 
 def draw_values(weights: LearnedWeights) -> Figure:
     """What each state variable adds to each action's value, a panel for each variable."""
+    from matplotlib.figure import Figure
+
     tiling, added = weights.tiling, contributions(weights)
     columns = 4
     rows = math.ceil(tiling.num_features / columns)
@@ -105,6 +109,8 @@ def draw_values(weights: LearnedWeights) -> Figure:
 
 def draw_preferences(weights: LearnedWeights) -> Figure:
     """Which action is valued most as one taker moves: over the field, and across the pass to K2."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(11, 5.2), layout="constrained")
     field, lane = figure.subplots(1, 2)
     half_length, half_width = weights.field_length / 2, weights.field_width / 2
@@ -194,6 +200,8 @@ def _draw_map(
     axes: Axes, weights: LearnedWeights, x: np.ndarray, y: np.ndarray, shown: Preferences
 ) -> None:
     """Each place in the colour of its action, the paler the smaller the margin."""
+    from matplotlib.colors import to_rgb
+
     own = itertools.islice(itertools.cycle(LINE_COLOURS), len(weights.action_names))
     colours = np.array([*map(to_rgb, own), UNTRAINED])  # the last is for -1
     strong = np.quantile(shown.margin, 0.8) or 1.0
@@ -216,6 +224,8 @@ def _draw_players(axes: Axes, weights: LearnedWeights) -> None:
 
 
 def _legend(figure: Figure, weights: LearnedWeights) -> None:
+    from matplotlib.patches import Patch
+
     names = zip(weights.action_names, itertools.cycle(LINE_COLOURS), strict=False)
     handles = [Patch(color=colour, label=name) for name, colour in names]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
