@@ -23,7 +23,7 @@ from keepaway_sim.analysis.figures import (
 )
 from keepaway_sim.analysis.tally import Analyst, EpisodeRow, Tally
 from keepaway_sim.bags.match_bag import MatchBag
-from keepaway_sim.task import Action, Outcome
+from keepaway_sim.task import Action, Outcome, Task
 
 TABLE_SCHEMA = pa.schema(
     [
@@ -58,6 +58,12 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
     summary = summarise_match(bag, tally) | {"missing": analyst.gaps.report()}
     (output / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n")
     made_by = f"{bag.match['task']}, seed {bag.match['seed']}, {bag.match['code_version']}"
+    draw(tally, task, made_by, output)
+    return in_words(summary)
+
+
+def draw(tally: Tally, task: Task, made_by: str, output: Path) -> None:
+    """Write the four figures; `made_by` stands in each."""
     for name, figure in (
         ("hold_time", hold_time_figure(np.array(tally.durations))),
         ("passes", passes_figure(tally.passes, task) if tally.whole else unknown_figure("Passes")),
@@ -66,7 +72,6 @@ def analyse(path: Path | str, output: Path, number: int | None = None) -> str:
     ):
         figure.text(0.01, 0.005, made_by, fontsize=6, color="0.4", parse_math=False)
         figure.savefig(output / f"{name}.png", dpi=150, metadata={"Description": made_by})
-    return in_words(summary)
 
 
 def _write_table(rows: Iterator[EpisodeRow], output: Path) -> None:
