@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -41,9 +42,11 @@ def episodes(summary: dict[str, Any]) -> Played:
     return list(zip(summary["episode_cycles"], summary["episode_outcomes"], strict=True))
 
 
-def wait_for(condition: Any) -> None:
+def wait_for(match: "subprocess.Popen[str]", condition: Callable[[], Any]) -> None:
+    """Wait for something that a match brings about, which one that has ended does not."""
     until = time.monotonic() + PATIENCE
     while not condition():
+        assert match.poll() is None, match.communicate()[1]
         assert time.monotonic() < until, "it never happened"
         time.sleep(0.05)
 
@@ -92,8 +95,8 @@ def test_ctrl_c_leaves_weights_and_bag_whole(tmp_path: Path) -> None:
     weights, bag = tmp_path / "weights", tmp_path / "bag"
     arguments = ["--keeper-policy", "learn", "--save-weights", str(weights), "--record", str(bag)]
     match = start(*arguments)
-    wait_for(lambda: list(bag.glob("*.mcap")) and bag.stat().st_size)
-    wait_for(lambda: any(file.stat().st_size > 100_000 for file in bag.glob("*.mcap")))
+    wait_for(match, lambda: list(bag.glob("*.mcap")) and bag.stat().st_size)
+    wait_for(match, lambda: any(file.stat().st_size > 100_000 for file in bag.glob("*.mcap")))
     match.send_signal(signal.SIGINT)
     summary, _ = finish(match)
     assert match.returncode == 130
@@ -107,7 +110,7 @@ def test_ctrl_c_leaves_weights_and_bag_whole(tmp_path: Path) -> None:
 
 def test_a_player_that_is_killed_is_named_and_the_match_goes_on() -> None:
     match = start("--episodes", "60", "--keeper-policy", "random")
-    wait_for(lambda: "keeper_2" in nodes_of(match))
+    wait_for(match, lambda: "keeper_2" in nodes_of(match))
     assert match.stderr is not None
     line = match.stderr.readline()
     while "episodes" not in line:
@@ -126,12 +129,12 @@ def test_a_player_that_is_killed_comes_back_with_what_it_saved(tmp_path: Path) -
     weights = tmp_path / "keeper_2.npz"
     arguments = ["--keeper-policy", "learn", "--save-weights", str(tmp_path)]
     match = start(*arguments, "--save-every", "5", "--restart")
-    wait_for(lambda: "keeper_2" in nodes_of(match) and weights.exists())
+    wait_for(match, lambda: "keeper_2" in nodes_of(match) and weights.exists())
     first = nodes_of(match)["keeper_2"]
     saved = load_weights(weights).episodes
     os.kill(first, signal.SIGKILL)
-    wait_for(lambda: nodes_of(match).get("keeper_2", first) != first)
-    wait_for(lambda: load_weights(weights).episodes > saved)
+    wait_for(match, lambda: nodes_of(match).get("keeper_2", first) != first)
+    wait_for(match, lambda: load_weights(weights).episodes > saved)
     match.send_signal(signal.SIGINT)
     summary, err = finish(match)
     assert "keeper_2 ended with code -9" in err
@@ -146,10 +149,10 @@ def test_the_bag_of_a_simulator_that_was_started_again_carries_the_weights_of_th
     weights, bag = tmp_path / "weights", tmp_path / "bag"
     arguments = ["--keeper-policy", "learn", "--save-weights", str(weights), "--record", str(bag)]
     match = start(*arguments, "--save-every", "2", "--restart")
-    wait_for(lambda: all((weights / f"{keeper}.npz").exists() for keeper in KEEPERS))
+    wait_for(match, lambda: all((weights / f"{keeper}.npz").exists() for keeper in KEEPERS))
     os.kill(nodes_of(match)["simulator"], signal.SIGKILL)
     again = tmp_path / "bag_2"
-    wait_for(lambda: any(file.stat().st_size > 100_000 for file in again.glob("*.mcap")))
+    wait_for(match, lambda: any(file.stat().st_size > 100_000 for file in again.glob("*.mcap")))
     match.send_signal(signal.SIGINT)
     finish(match)
     attached = {name: read_weights(BytesIO(data)) for name, data in BagReader(again).attachments()}
