@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from statsmodels.stats.multitest import multipletests
 
 from keepaway_transfer.reports import statistics
 
@@ -122,6 +123,14 @@ def test_what_is_not_known_has_no_interval(generator):
 def test_holm_multiplies_the_smallest_by_the_number_of_rows():
     # Sorted .01, .03, .04 by 3, 2, 1: .03, .06, .04, and never below the one before.
     assert statistics.holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_holm_gives_the_bits_of_statsmodels():
+    generator = np.random.default_rng(1)
+    for number in range(1, 30, 4):
+        p_values = generator.random(number).round(2) ** 2  # some are equal, some are 0
+        expected = multipletests(p_values, method="holm")[1]
+        np.testing.assert_array_equal(statistics.holm(p_values), expected)
 
 
 def test_trials_needed_for_the_effects_of_the_facts_page():

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 from statsmodels.duration.survfunc import SurvfuncRight
-from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.power import TTestIndPower
 
 from keepaway_transfer.metrics import Floats
@@ -184,10 +183,15 @@ def logrank(
 def holm(p_values: ArrayLike) -> Floats:
     """Holm's step-down adjustment of the p-values of one table.
 
+    That of statsmodels does the same, and collects garbage in each call: seconds of a report.
+
     >>> holm([0.01, 0.04, 0.03])
     array([0.03, 0.06, 0.06])
     """
-    adjusted: Floats = multipletests(_floats(p_values), method="holm")[1]
+    values = _floats(p_values)
+    order, adjusted = np.argsort(values), np.empty_like(values)
+    larger = values[order] * np.arange(len(values), 0, -1)
+    adjusted[order] = np.minimum(np.maximum.accumulate(larger), 1.0)
     return adjusted
 
 
