@@ -179,9 +179,8 @@ def read(bag: Path, how: str, folder: Path) -> str:
     empty = folder / "empty.html"
     empty.write_text("<!doctype html><title>empty</title>")
     size, seconds = page.stat().st_size / 1e6, [opened(each) for each in (page, empty)]
-    known = f": opened in {seconds[0]:.1f} s, an empty one in {seconds[1]:.1f} s" * (
-        None not in seconds
-    )
+    times = [f"{each:.1f} s" for each in seconds if each is not None]
+    known = f": opened in {times[0]}, an empty one in {times[1]}" if times else ""
     print(f"  its page has {size:.1f} MB{known}", flush=True)
     facts = re.sub(r"\d+ messages came", "messages came", page.read_text())
     return hashlib.sha256((out / "episodes.csv").read_bytes() + facts.encode()).hexdigest()
