@@ -17,7 +17,10 @@ from keepaway_transfer.studies.study import load_study
 
 SCRIPT = Path(__file__).parents[2] / "scripts/study.py"
 TINY = load_study("tiny")
-pytestmark = pytest.mark.timeout(1200)  # the first trial on a machine waits for the compiler
+pytestmark = [
+    pytest.mark.timeout(1200),  # the first trial on a machine waits for the compiler
+    pytest.mark.xdist_group("study"),  # whole runs are played once, for all that are compared
+]
 
 
 def command(*arguments):
@@ -37,6 +40,14 @@ def whole(tmp_path_factory):
     """The folder of a run that nothing interrupted, and what it said."""
     folder = tmp_path_factory.mktemp("study") / "whole"
     return folder, study("--out", folder)
+
+
+@pytest.fixture(scope="module")
+def whole_of_20(tmp_path_factory):
+    """The folder of a run of 20 trials a row that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("study") / "whole"
+    study("--out", folder, "--trials", 20)
+    return folder
 
 
 def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
@@ -60,7 +71,7 @@ def test_a_study_runs_to_its_end_and_tells_how_far_it_is(whole):
         ([signal.SIGHUP], 129),
     ],
 )
-def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, code):
+def test_a_run_that_was_stopped_goes_on_to_the_same_results(whole_of_20, tmp_path, signals, code):
     log = tmp_path / "cut" / "trials.jsonl"
     arguments = ("--out", log.parent, "--batch", 1, "--trials", 20)
     with subprocess.Popen(command(*arguments), stderr=subprocess.PIPE, text=True) as running:
@@ -83,8 +94,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_results(tmp_path, signals, c
     done = study(*arguments, "--resume")
     assert done.returncode == 0, done.stderr
     assert f"study: {before + 1}/60 trials" in done.stderr
-    study("--out", tmp_path / "whole", "--trials", 20)
-    assert trials_in(log.parent) == trials_in(tmp_path / "whole")
+    assert trials_in(log.parent) == trials_in(whole_of_20)
 
 
 def test_a_worker_that_is_killed_is_replaced_and_the_study_ends_with_the_same(whole, tmp_path):
