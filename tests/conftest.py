@@ -3,7 +3,6 @@
 import os
 import resource
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,10 +21,7 @@ hypothesis.settings.register_profile("keepaway", deadline=None)  # a busy machin
 hypothesis.settings.load_profile("keepaway")
 
 # With this set, every program that a test starts compiles all that it imports: 1.5 s of a node's 2.
-# Its programs keep that in the environment's folder instead, beside no source.
-if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
-    sys.dont_write_bytecode = False
-    sys.pycache_prefix = os.environ.setdefault("PYTHONPYCACHEPREFIX", f"{sys.prefix}/pycache")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # A shell lets its background jobs ignore Ctrl-C, nohup a closed terminal, and whatever they start
 # does so too: not what tests start.
