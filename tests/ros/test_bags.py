@@ -28,6 +28,7 @@ from keepaway_sim.nodes.recorder import Recorder
 from keepaway_sim.nodes.replayer import Replayer
 from keepaway_sim.nodes.spectator import Spectator
 from keepaway_sim.ros.publishing import LATCHED
+from keepaway_sim.task import Task
 from keepaway_sim.view.server import Server
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -193,6 +194,26 @@ def test_in_lock_step_the_simulator_waits_for_its_recorder(graph: Graph, tmp_pat
     recorder.destroy_node()
     assert max(furthest) == 51  # one more than it may be behind: then it waits
     assert len(list(MatchBag(tmp_path / "bag").episodes())) == 3
+
+
+def test_a_recorder_is_ready_only_when_every_players_requests_come(
+    graph: Graph, tmp_path: Path
+) -> None:
+    recorder = start_recorder(graph, tmp_path / "bag")
+    graph.hook = recorder.poll
+    graph.start_simulator(episodes=1, seed=3, wait_for_recorder=True)
+    recorders, names = graph.simulator.conductor.recorders, Task.parse("3v2").player_names
+    for name in names[:-1]:
+        graph.start_player(name)
+    until = time.monotonic() + 2.0
+    graph.play(lambda: time.monotonic() > until)
+    assert recorder.gaps.topics  # it knows the match
+    assert not recorders.num_reporting
+    graph.start_player(names[-1])
+    graph.play()
+    assert recorders.num_reporting == 1
+    assert recorder.finish().startswith("nothing is missing of ")
+    recorder.destroy_node()
 
 
 def test_of_several_recorders_it_waits_for_the_slowest(graph: Graph, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ between. The simulator can wait for it: `recorded` has the simulated time that i
 """
 
 import json
+import math
 import signal
 import struct
 import sys
@@ -52,6 +53,7 @@ from keepaway_sim.wire.messages import (
 POLL_PERIOD = 0.005  # [s]
 FLUSH_PERIOD = 1.0  # [s]
 QUIET = 0.3  # [s] nothing came for this long: all that was published has come
+LONGEST_FIRST_WAIT = 10.0  # [s] for a player that publishes no requests
 LONGEST_LAST_WAIT = 5.0  # [s] a match that continues is left after this time
 REPORT_STEP = 10 * CYCLE_NS  # a simulator that waits for it lets it be further behind than that
 MATCH_TOPICS = {
@@ -117,6 +119,7 @@ class Recorder(Node):
         self._subscriptions_by_topic: dict[str, tuple[str, Subscription]] = {}
         self._times = OwnTimes()
         self._reported = -1
+        self._connected_at = math.inf  # [s] of the monotonic clock: all but the players' requests
         self._flushed = time.monotonic()
         for name, message_type in self.settings.topics().items():
             self._listen(name, message_type)
@@ -228,11 +231,29 @@ class Recorder(Node):
         self.gaps.expect(self.resolve_topic_name("field_state"))
 
     def _is_listening_to_players(self) -> bool:
-        """Whether every node that publishes each cycle is known and connected."""
+        """Whether all that publish each cycle are connected, and all players who answer.
+
+        A player may publish its first request late: it is waited for `LONGEST_FIRST_WAIT`.
+        """
+        if self._reported >= 0:
+            return True
         topics = self.gaps.topics
-        return len(topics) > 1 and (
-            self._reported >= 0 or all(self.count_publishers(topic) for topic in topics)
-        )
+        if len(topics) < 2 or not all(map(self._is_connected, topics)):
+            return False
+        now = time.monotonic()
+        self._connected_at = min(self._connected_at, now)
+        requests = [
+            topic
+            for topic, (message_type, _) in self._subscriptions_by_topic.items()
+            if message_type == ACTION_REQUEST
+        ]
+        waited = now - self._connected_at
+        return all(map(self._is_connected, requests)) or waited > LONGEST_FIRST_WAIT
+
+    def _is_connected(self, topic: str) -> bool:
+        """Whether a publisher's messages come here; the graph may know it before that."""
+        _, subscription = self._subscriptions_by_topic[topic]
+        return bool(subscription.get_publisher_count())
 
     def _report(self, time_ns: int, is_behind: bool) -> None:
         """Say what has been reached: all of it, or while more is coming a step ahead."""
