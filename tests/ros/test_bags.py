@@ -200,7 +200,11 @@ def test_a_recorder_is_ready_only_when_every_players_requests_come(
     graph: Graph, tmp_path: Path
 ) -> None:
     recorder = start_recorder(graph, tmp_path / "bag")
-    graph.hook = recorder.poll
+
+    def listen() -> None:
+        recorder.poll()
+
+    graph.hook = listen
     graph.start_simulator(episodes=1, seed=3, wait_for_recorder=True)
     names = Task.parse("3v2").player_names
 
