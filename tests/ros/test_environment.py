@@ -71,15 +71,22 @@ def test_python_alone_is_enough_to_find_ros(tmp_path: Path) -> None:
 
 def test_writers_repeat_what_there_is_twenty_times_a_second() -> None:
     """By default every 3 s: so long a reader that lost the last message would wait for it."""
+    assert period("heartbeatPeriod") == 0.05
+
+
+def test_processes_announce_themselves_twice_a_second() -> None:
+    """By default every 3 s: so long two would wait that missed each other's first words."""
+    assert period("leaseAnnouncement") == 0.5
+
+
+def period(name: str) -> float:
+    """A period of our profiles for Fast DDS [s]."""
     profiles = ElementTree.parse(ROOT / "src/keepaway_sim/fastdds.xml").getroot()
-    period = {part.tag.rpartition("}")[2]: int(part.text or "") for part in _of(profiles)}
-    assert period == {"sec": 0, "nanosec": 50_000_000}
-
-
-def _of(profiles: ElementTree.Element) -> ElementTree.Element:
-    found = profiles.find(".//{*}heartbeatPeriod")
+    found = profiles.find(f".//{{*}}{name}")
     assert found is not None
-    return found
+    parts = {part.tag.rpartition("}")[2]: int(part.text or "") for part in found}
+    assert parts.keys() == {"sec", "nanosec"}
+    return parts["sec"] + parts["nanosec"] / 1e9
 
 
 def test_what_a_slow_reader_lost_it_has_in_the_end(ros_domain: int) -> None:
