@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.match.roster import Roster, checked_request
+from keepaway_sim.match.roster import MOST_OPEN, Roster, checked_request
 from keepaway_sim.task import Action, Outcome, Task
 from keepaway_sim.wire.messages import Request, action_request
 from keepaway_sim.world.config import Config
@@ -124,7 +124,24 @@ def test_who_is_always_late_is_not_missing(world, roster):
         next_cycle(world, roster, now=0.1 * cycle)
         roster.take(KEEPER, answer(KEEPER, *before))
         assert "keeper_1" not in roster.time_out(0.1 * cycle + 0.09, TIMEOUT)
-    assert roster.seats[KEEPER].late == 49
+    seat = roster.seats[KEEPER]
+    assert seat.late == seat.missed == 48  # at the episode's end no answer was due
+
+
+def test_an_answer_that_comes_twice_is_no_late_one(world, roster):
+    """A perception that was sent again is answered again."""
+    roster.take(KEEPER, answer(KEEPER))
+    next_cycle(world, roster, now=0.1)
+    roster.take(KEEPER, answer(KEEPER, cycle=0))
+    seat = roster.seats[KEEPER]
+    assert (seat.late, seat.missed, seat.rejected) == (0, 0, 0)
+
+
+def test_of_answers_that_never_come_only_the_last_are_kept(world, roster):
+    for cycle in range(1, MOST_OPEN + 300):
+        next_cycle(world, roster, now=0.1 * cycle)
+    seat = roster.seats[KEEPER]
+    assert seat.missed > len(seat.open) == MOST_OPEN
 
 
 def test_requests_of_an_earlier_episode_are_not_played(world, roster):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from keepaway_sim.world.world import World
 
 MAX_ACTION_VALUES = 64
 """More than any learner chooses from; a longer message is not an answer."""
+MOST_OPEN = 1000  # missed answers that may still come; one so late is not looked for
 _COUNT = struct.Struct("<I")
 
 
@@ -34,8 +35,9 @@ _COUNT = struct.Struct("<I")
 class Seat:
     """One player's place in a match.
 
-    `late` counts answers that came after their cycle was played, `missed` due answers that did
-    not come in time, `rejected` messages that no player may send.
+    `missed` counts due answers that did not come in time, `late` those of them that came after
+    their cycle was played, `rejected` messages that no player may send. An answer that comes twice,
+    because its perception was sent again, is no trouble.
     """
 
     name: str
@@ -48,6 +50,14 @@ class Seat:
     late: int = 0
     missed: int = 0
     rejected: int = 0
+    open: dict[tuple[int, int], None] = field(default_factory=dict)  # missed: episode, cycle
+
+    def miss(self, moment: tuple[int, int]) -> None:
+        """Count a due answer that did not come in time; of the last ones it is known which."""
+        self.missed += 1
+        self.open[moment] = None
+        if len(self.open) > MOST_OPEN:
+            del self.open[next(iter(self.open))]
 
 
 class Roster:
@@ -174,7 +184,8 @@ class Roster:
         for player, seat in enumerate(self.seats):
             if not self._due[player]:
                 continue
-            seat.missed += not seat.data
+            if not seat.data:
+                seat.miss((self._episode, self._cycle))
             if seat.in_force is not None and (seat.present or seat.data):
                 action[0, player], target[0, player] = seat.in_force.action, seat.in_force.target
             else:
@@ -208,7 +219,10 @@ class Roster:
         return request
 
     def _take_late(self, seat: Seat, request: Request) -> None:
-        seat.late += 1
+        moment = request.episode, request.cycle
+        if moment in seat.open:
+            seat.late += 1
+            del seat.open[moment]
         if not seat.present or request.episode != self._episode:
             return
         known = seat.in_force
