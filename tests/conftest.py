@@ -31,9 +31,13 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 @pytest.hookimpl(tryfirst=True)  # before xdist looks at the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests that run nodes on one worker: two ROS graphs at once would both be late."""
+    """Keep the tests that run nodes on one worker: two ROS graphs at once would both be late.
+
+    A file that names a group of its own stays out of theirs.
+    """
     for item in items:
-        if {"ros", "nodes"} & set(item.path.relative_to(ROOT).parts[1:-1]):
+        of_nodes = {"ros", "nodes"} & set(item.path.relative_to(ROOT).parts[1:-1])
+        if of_nodes and not item.get_closest_marker("xdist_group"):
             item.add_marker(pytest.mark.xdist_group("ros"))
 
 

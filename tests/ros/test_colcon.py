@@ -15,6 +15,8 @@ from rclpy.wait_for_message import wait_for_message
 
 from keepaway_msgs.msg import Match
 
+pytestmark = pytest.mark.xdist_group("colcon")  # mostly a compiler that runs
+
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EXECUTABLES = {
     "keepaway_sim": {"simulator", "recorder", "replayer"},

@@ -24,8 +24,8 @@ for array in (*fields.truth, *fields.belief, *fields.memory):
     digest.update(array.tobytes())
 print(digest.hexdigest())
 """
-OTHERS = {"haswell": "avx2", "x86-64-v2": "sse4.2"}
-"""Processors, and what a machine must have to run their code: 4 and 2 doubles at once."""
+NARROWER = {"avx512f": "haswell", "avx2": "x86-64-v2"}
+"""By what a machine has: a processor that works on half as many doubles at once, 4 or 2."""
 
 
 def start(env: dict[str, str], cache: Path) -> "subprocess.Popen[str]":
@@ -38,15 +38,15 @@ def start(env: dict[str, str], cache: Path) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.slow
-def test_learning_gives_the_same_bits_on_processors_of_any_vector_width(tmp_path: Path) -> None:
+def test_learning_gives_the_same_bits_on_processors_of_another_vector_width(tmp_path: Path) -> None:
     has = llvmlite.binding.get_host_cpu_features()
-    others = [name for name, feature in OTHERS.items() if has.get(feature)]
-    if not others:
+    other = next((name for feature, name in NARROWER.items() if has.get(feature)), None)
+    if other is None:
         pytest.skip("a processor of another kind: it runs the code of no other")
-    envs = [{"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} for name in others]
-    running = [start(env, tmp_path) for env in ({}, *envs)]
+    envs: list[dict[str, str]] = [{}, {"NUMBA_CPU_NAME": other, "NUMBA_CPU_FEATURES": ""}]
+    running = [start(env, tmp_path) for env in envs]
     digests = [process.communicate()[0] for process in running]
-    assert all(process.returncode == 0 for process in running)
+    assert [process.returncode for process in running] == [0, 0]
     assert len(digests[0].strip()) == 64
-    assert len(set(digests)) == 1
-    assert len(list((tmp_path / "keepaway").glob("machine_code-*"))) == len(others)
+    assert digests[0] == digests[1]
+    assert len(list((tmp_path / "keepaway").glob("machine_code-*"))) == 1
