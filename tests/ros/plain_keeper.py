@@ -1,7 +1,5 @@
 """A keeper of one's own: ordinary messages, none of this project's code. It goes, and holds."""
 
-import contextlib
-
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -50,8 +48,13 @@ class PlainKeeper(Node):
 
 def main() -> None:
     rclpy.init()
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+    try:
         rclpy.spin(PlainKeeper())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if rclpy.ok():  # else it was ended while it answered
+            raise
 
 
 if __name__ == "__main__":

@@ -65,6 +65,35 @@ def test_what_an_agent_does_wrong_is_said(tmp_path: Path) -> None:
     assert "exit code 3" in failed[2]
 
 
+ENDS_ITSELF = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import rclpy
+from smallest_agent import ActionRequest, SmallestAgent, main
+
+class Ended(SmallestAgent):
+    def __init__(self):
+        super().__init__()
+        self.create_timer(0.01, self.answer)
+
+    def answer(self):
+        if sys.argv[2] == "stops":
+            rclpy.shutdown()  # as a signal does, which may come at any moment
+        self.requests.publish(ActionRequest() if sys.argv[2] == "stops" else None)
+
+main(Ended)
+"""
+
+
+@pytest.mark.parametrize(("how", "code"), [("stops", 0), ("fails", 1)])
+def test_who_is_ended_while_it_answers_ends_well_and_who_fails_does_not(
+    ros_domain: int, how: str, code: int
+) -> None:
+    command = [sys.executable, "-c", ENDS_ITSELF, str(EXAMPLES), how]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == code, ended.stderr
+
+
 def test_a_command_that_there_is_not_is_refused_in_a_line() -> None:
     checked = check("--", "no_such_agent")
     assert checked.returncode == 2

@@ -1,7 +1,5 @@
 """The smallest complete agent, keeper or taker: it goes to the ball, holds it, gets open."""
 
-import contextlib
-
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -52,8 +50,13 @@ class SmallestAgent(Node):
 def main(agent=SmallestAgent):
     """Play until SIGINT or SIGTERM."""
     rclpy.init()
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+    try:
         rclpy.spin(agent())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if rclpy.ok():  # else it was ended while it answered
+            raise
 
 
 if __name__ == "__main__":
