@@ -37,6 +37,7 @@ TWINS = (
     "passing.py",
     "running.py",
     "settings.py",
+    "trigonometry.py",
 )
 """Files that two packages have on purpose, equal but for the package's name."""
 TWIN_NAMES = {

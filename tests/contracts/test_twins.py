@@ -26,6 +26,7 @@ TWINS = {
     "ros/running.py": "nodes/running.py",
     "world/machine_code.py": "machine_code.py",
     "world/passing.py": "passing.py",
+    "world/trigonometry.py": "trigonometry.py",
 }
 
 

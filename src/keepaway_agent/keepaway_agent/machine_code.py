@@ -36,6 +36,7 @@ SOURCES: Final = (
     "playing",
     "task.py",
     "training/deciding.py",
+    "trigonometry.py",
     "world",
 )
 """Files and folders of both packages from which machine code is made."""

@@ -9,7 +9,8 @@ from scenes import make_record
 from keepaway_sim.task import Task
 from keepaway_sim.world import survey
 from keepaway_sim.world.config import noiseless, profile
-from keepaway_sim.world.geometry import TWO_PI, bearing, length, quantize, wrap
+from keepaway_sim.world.geometry import TWO_PI, length, quantize, wrap
+from keepaway_sim.world.trigonometry import bearing
 
 CONFIGS = {
     "rounded": profile(),

@@ -17,6 +17,7 @@ import numpy as np
 
 from keepaway_agent.actions import Role
 from keepaway_agent.compiled import compiled
+from keepaway_agent.trigonometry import bearing
 
 BY_BALL: Final = 0
 """Rank players by distance to the ball: the paper's order, and the default."""
@@ -199,7 +200,7 @@ def least_angle(position, apex, player, order, first, last):
     greatest = -1.0
     for rank in range(first, last):
         greatest = max(greatest, cos_angle(position, apex, player, order[rank]))
-    return math.acos(greatest)
+    return bearing(greatest, math.sqrt((1.0 - greatest) * (1.0 + greatest)))
 
 
 @compiled

@@ -92,7 +92,8 @@ def _open_points(task: Task, border: float) -> dict[str, np.ndarray]:
 
 def _roll_table(decay: float) -> np.ndarray:
     """(ROLL_CYCLES,) distance over first speed of what rolls for 0, 1, .. cycles."""
-    return (1.0 - decay ** np.arange(ROLL_CYCLES)) / (1.0 - decay)
+    left = np.cumprod(np.append(1.0, np.full(ROLL_CYCLES - 1, decay)))  # of its speed
+    return (1.0 - left) / (1.0 - decay)
 
 
 def _sight_tables(step: float) -> dict[str, np.ndarray]:
@@ -104,7 +105,7 @@ def _sight_tables(step: float) -> dict[str, np.ndarray]:
     step = step or 1.0  # exact distances need no tables
     first, last = math.log(SIGHT_NEAREST) // step, math.log(SIGHT_FARTHEST) // step
     steps = np.arange(first, last + 1) * step
-    edge = np.append(np.exp(steps[:-1] + 0.5 * step), math.inf)
+    edge = np.append(_rounded(np.exp(steps[:-1] + 0.5 * step)), math.inf)
     cells = np.arange(int(SIGHT_FARTHEST * SIGHT_CELLS)) / SIGHT_CELLS
     return {
         "sight_edge": edge,
@@ -117,4 +118,12 @@ def _direction_tables(step: float) -> dict[str, np.ndarray]:
     """Cosines and sines of the directions that players see, multiples of `step` [rad]."""
     most = math.ceil(math.pi / step) if step > 0.0 else 0
     direction = step * np.arange(-most, most + 1)
-    return {"direction_cosine": np.cos(direction), "direction_sine": np.sin(direction)}
+    return {
+        "direction_cosine": _rounded(np.cos(direction)),
+        "direction_sine": _rounded(np.sin(direction)),
+    }
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """To 2**-40: numpy's functions differ in their last bits from one processor to another."""
+    return np.round(values * 2.0**40) / 2.0**40

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from keepaway_sim.task import Action, Outcome
 from keepaway_sim.world import physics, referee, sight
 from keepaway_sim.world.compiled import compiled, compiled_apart
@@ -17,6 +15,7 @@ from keepaway_sim.world.skills.running import expected_turn
 from keepaway_sim.world.state import DASH, KICK, TURN
 from keepaway_sim.world.streams import draw
 from keepaway_sim.world.survey import looks_now, survey
+from keepaway_sim.world.trigonometry import unit
 
 _HOLD = int(Action.HOLD_BALL)
 _PASS = int(Action.PASS_BALL)
@@ -159,8 +158,9 @@ def _kick(w, f, p, power, angle):
         largest = physics.kick_noise_radius(c, power, rel_x, rel_y, yaw, speed)
         radius = largest * draw(w.random, f)
         direction = TWO_PI * draw(w.random, f)
-        acceleration[ball, 0] += radius * math.cos(direction)
-        acceleration[ball, 1] += radius * math.sin(direction)
+        ux, uy = unit(direction)
+        acceleration[ball, 0] += radius * ux
+        acceleration[ball, 1] += radius * uy
 
 
 @compiled

@@ -31,37 +31,6 @@ def rotated(x, y, cosine, sine):
     return cosine * x - sine * y, sine * x + cosine * y
 
 
-# Least greatest error of an odd polynomial with eight terms for atan on [0, 1]: 4e-8.
-_ATAN = (
-    0.9999993355890431,
-    -0.3332986080635244,
-    0.19946565793303064,
-    -0.13908629945319914,
-    0.09642197822073613,
-    -0.05591232868276117,
-    0.021862956809221935,
-    -0.004054566431327402,
-)
-
-
-@compiled
-def bearing(x, y):
-    """Direction of a vector [rad], at most 4e-8 off (atan2 takes four times as long)."""
-    across, along = abs(y), abs(x)
-    larger = max(across, along)
-    t = min(across, along) / larger if larger > 0.0 else 0.0
-    q = t * t
-    a0, a1, a2, a3, a4, a5, a6, a7 = _ATAN
-    even = ((a6 * q * q + a4) * q * q + a2) * q * q + a0  # two chains of sums side by side
-    odd = ((a7 * q * q + a5) * q * q + a3) * q * q + a1
-    angle = t * (even + q * odd)
-    if across > along:
-        angle = 0.5 * math.pi - angle
-    if x < 0.0:
-        angle = math.pi - angle
-    return -angle if y < 0.0 else angle
-
-
 @compiled
 def clip(value, low, high):
     """`value`, but no less than `low` and no more than `high`."""

@@ -10,7 +10,7 @@ import math
 
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
-from keepaway_sim.world.geometry import bearing, length, wrap
+from keepaway_sim.world.geometry import length, wrap
 from keepaway_sim.world.memory import nearest_opponent_to_ball, same_team
 from keepaway_sim.world.phantoms import (
     SAME_PLAYER,
@@ -23,6 +23,7 @@ from keepaway_sim.world.phantoms import (
     set_age,
     yaw_of,
 )
+from keepaway_sim.world.trigonometry import bearing, unit
 
 MUST_BE_SEEN = 0.65  # [1] P: inside this share of half the cone everything must be seen
 MUST_BE_FELT = 0.9  # [1] P: of the distance at which the ball is felt, for noise
@@ -111,12 +112,13 @@ def _move_to_edge(w, f, p, j):
     x, y = place_of(w, f, p, j)
     off = _off_centre(w, f, p, x, y)
     if abs(off) < UNSURE and _faced_lately(w, f, p, j):
-        yaw = yaw_of(w, f, p, j)
-        off = _off_centre(w, f, p, x + 2.0 * math.cos(yaw), y + 2.0 * math.sin(yaw))
+        ux, uy = unit(yaw_of(w, f, p, j))
+        off = _off_centre(w, f, p, x + 2.0 * ux, y + 2.0 * uy)
     edge = belief.body[f, p, p] + belief.neck[f, p]
     edge += 0.5 * c.visible_angle if off > 0.0 else -0.5 * c.visible_angle
     away = length(x - own[0], y - own[1])
-    to_x, to_y = own[0] + away * math.cos(edge), own[1] + away * math.sin(edge)
+    ux, uy = unit(edge)
+    to_x, to_y = own[0] + away * ux, own[1] + away * uy
     if length(to_x - x, to_y - y) < farthest(w, f, p, j):
         put(w, f, p, j, to_x, to_y)
 

@@ -12,6 +12,7 @@ from keepaway_sim.world.physics import dash_acceleration, kick_acceleration, lim
 from keepaway_sim.world.skills.fastest import fastest_opponent
 from keepaway_sim.world.state import DASH
 from keepaway_sim.world.streams import draw
+from keepaway_sim.world.trigonometry import bearing, unit
 
 CHASE_SPEED = 0.3  # [m/cycle] P: the opponent fastest to the ball is believed to come so fast
 DRIFT = 0.25  # [m/cycle] P: so fast the others drift along x while they are not seen
@@ -230,8 +231,8 @@ def _bump_ball(w, f, p):
         x, y = place_of(w, f, p, j)
         if length(x - own[0], y - own[1]) < distance:
             return
-    angle = math.atan2(dy, dx)
-    belief.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * math.cos(angle)
-    belief.position[f, p, ball, 1] = own[1] + BUMPED_DISTANCE * math.sin(angle)
+    ux, uy = unit(bearing(dx, dy))
+    belief.position[f, p, ball, 0] = own[0] + BUMPED_DISTANCE * ux
+    belief.position[f, p, ball, 1] = own[1] + BUMPED_DISTANCE * uy
     belief.velocity[f, p, ball, 0] *= -0.1
     belief.velocity[f, p, ball, 1] *= -0.1

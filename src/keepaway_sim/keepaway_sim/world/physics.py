@@ -7,8 +7,7 @@ pushes overlapping discs apart and reverses them by the server's rule.
 
 Positions and velocities are kept on a grid of 2**-30 m. A field's place in the shared space is a
 multiple of a power of two, so adding it is exact and a field behaves to the last bit alike
-wherever it lies, and whether pymunk moves it or not. The grid also absorbs the last bit in which
-processors' sines differ.
+wherever it lies, and whether pymunk moves it or not.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from typing import NamedTuple
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.geometry import TWO_PI, clip, length, wrap
 from keepaway_sim.world.streams import draw
+from keepaway_sim.world.trigonometry import bearing, unit
 
 GRID = 2.0**30  # [1/m] positions and velocities are whole multiples of 1/GRID
 OVERLAP = 1e-6  # [m] discs closer than touching by less than this do not collide
@@ -36,7 +36,8 @@ def on_grid(value):
 def dash_acceleration(c, power, yaw):
     """Acceleration (x, y) [m/cycle^2] of a dash with `power` along the body (S: leg.cpp)."""
     effective = clip(power, c.min_dash_power, 100.0) * c.dash_power_rate
-    return effective * math.cos(yaw), effective * math.sin(yaw)
+    ux, uy = unit(yaw)
+    return effective * ux, effective * uy
 
 
 @compiled
@@ -60,7 +61,7 @@ def kick_rate(c, rel_x, rel_y, yaw):
         rel_x, rel_y: ball relative to the player [m], field axes.
         yaw: the player's body direction [rad].
     """
-    direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
+    direction_share = abs(wrap(bearing(rel_x, rel_y) - yaw)) / math.pi
     distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
     return c.kick_power_rate * (1.0 - 0.25 * direction_share - 0.25 * distance_share)
 
@@ -69,13 +70,14 @@ def kick_rate(c, rel_x, rel_y, yaw):
 def kick_acceleration(c, power, direction, rel_x, rel_y, yaw):
     """Acceleration (x, y) of the ball by a kick without noise; `direction` relative to yaw."""
     size = clip(power, 0.0, 100.0) * kick_rate(c, rel_x, rel_y, yaw)
-    return size * math.cos(yaw + direction), size * math.sin(yaw + direction)
+    ux, uy = unit(yaw + direction)
+    return size * ux, size * uy
 
 
 @compiled
 def kick_noise_radius(c, power, rel_x, rel_y, yaw, ball_speed):
     """Largest kick noise [m/cycle^2]: grows with power, bad placement and ball speed (S 12.0)."""
-    direction_share = abs(wrap(math.atan2(rel_y, rel_x) - yaw)) / math.pi
+    direction_share = abs(wrap(bearing(rel_x, rel_y) - yaw)) / math.pi
     distance_share = (length(rel_x, rel_y) - c.touch_distance) / c.kickable_margin
     position_rate = 0.5 + 0.25 * (direction_share + distance_share)
     speed_rate = 0.5 + 0.5 * ball_speed / (c.ball_speed_max * c.ball_decay)
@@ -110,9 +112,9 @@ def moved_velocity(vx, vy, ax, ay, limits, draws, stream):
     vx, vy = limited(vx + ax, vy + ay, limits.speed)
     if limits.rand > 0.0 and (vx != 0.0 or vy != 0.0):
         radius = limits.rand * length(vx, vy) * draw(draws, stream)
-        angle = TWO_PI * draw(draws, stream)
-        vx += radius * math.cos(angle)
-        vy += radius * math.sin(angle)
+        ux, uy = unit(TWO_PI * draw(draws, stream))
+        vx += radius * ux
+        vy += radius * uy
     return on_grid(vx), on_grid(vy)
 
 

@@ -22,6 +22,7 @@ from keepaway_sim.world.ghosts import forget_double, remove_ghosts
 from keepaway_sim.world.memory import stop_ball_of_opponent
 from keepaway_sim.world.streams import draw
 from keepaway_sim.world.touch import feel_players
+from keepaway_sim.world.trigonometry import bearing, unit
 
 
 class Glimpse(NamedTuple):
@@ -44,7 +45,7 @@ def look(w, f, p):
     turn = yaw_error  # from `_reported_direction` to what the player believes
     if c.direction_step > 0.0:
         turn = w.truth.yaw[f, p] + belief.neck[f, p] + yaw_error
-    cosine, sine = math.cos(turn), math.sin(turn)
+    cosine, sine = unit(turn)
     w.scratch.felt[:] = math.nan
     for j in range(w.ball + 1):
         if j == p:
@@ -188,5 +189,5 @@ def turn_neck(w, f, p, x, y, turn):
     """Turn player p's neck toward a point, as far as it goes, after its body turned by `turn`."""
     belief = w.belief
     own = belief.position[f, p, p]
-    wanted = wrap(math.atan2(y - own[1], x - own[0]) - belief.body[f, p, p] - turn)
+    wanted = wrap(bearing(x - own[0], y - own[1]) - belief.body[f, p, p] - turn)
     belief.neck[f, p] = min(max(wanted, -0.25 * TWO_PI), 0.25 * TWO_PI)

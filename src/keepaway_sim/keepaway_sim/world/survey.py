@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from keepaway_sim.world.compiled import compiled
-from keepaway_sim.world.geometry import TWO_PI, bearing
+from keepaway_sim.world.geometry import TWO_PI
 from keepaway_sim.world.state import SIGHT_LANES
+from keepaway_sim.world.trigonometry import bearing
 
 DIRECTION_CHANGE_STEP = math.radians(0.1)  # [rad/cycle] S: direction change is rounded to it
 NEAREST = 1e-6  # [m] nothing is nearer: without a distance there is no direction

@@ -20,6 +20,7 @@ from keepaway_sim.world.skills.prediction import (
     straight_distance,
     straight_run,
 )
+from keepaway_sim.world.trigonometry import unit
 
 LATELY = 3  # [cycles] P: motion seen longer ago is unknown
 SOON = 4  # [cycles] the player nearest to the ball's place then is searched first
@@ -62,8 +63,8 @@ def _with_heading(w, f, p, j, body, faces):
     if not faces:
         return body
     x, y, vx, vy, _, _ = body
-    yaw = w.belief.body[f, p, j]
-    return Body(x, y, vx, vy, math.cos(yaw), math.sin(yaw))
+    ux, uy = unit(w.belief.body[f, p, j])
+    return Body(x, y, vx, vy, ux, uy)
 
 
 @compiled

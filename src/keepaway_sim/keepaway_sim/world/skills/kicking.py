@@ -11,6 +11,7 @@ from keepaway_sim.world.phantoms import age_of, num_opponents, opponent, place_o
 from keepaway_sim.world.physics import kick_acceleration, kick_rate, limited
 from keepaway_sim.world.skills.running import turn_body_to
 from keepaway_sim.world.state import KICK, NONE, Command
+from keepaway_sim.world.trigonometry import bearing, unit
 
 QUARTER = 0.25 * math.pi
 HOLD_RANGE = 5.0  # [m] a nearer opponent is shielded from
@@ -88,12 +89,12 @@ def hold_ball(w, f, p, distance):
     angle = 0.0
     if nearest >= 0 and away < HOLD_RANGE:
         ox, oy = place_of(w, f, p, nearest)
-        from_opponent = math.atan2(s.y - oy, s.x - ox)
+        from_opponent = bearing(s.x - ox, s.y - oy)
         heads_left = wrap(yaw_of(w, f, p, nearest) - from_opponent) > 0.0
         angle = wrap(from_opponent + (-QUARTER if heads_left else QUARTER) - s.yaw)
     # P compares with the spot at `angle` in field axes, not body axes; kept as it is there.
-    spot_x, spot_y = distance * math.cos(angle), distance * math.sin(angle)
-    spot = length(s.ball_x - s.x - spot_x, s.ball_y - s.y - spot_y)
+    spot_x, spot_y = unit(angle)
+    spot = length(s.ball_x - s.x - distance * spot_x, s.ball_y - s.y - distance * spot_y)
     if spot < AT_SPOT:
         chosen = turn_body_to(w, f, p, GOAL_X if p < c.num_keepers else -GOAL_X, 0.0, 1)
         next_x, next_y = ball_after(w, f, p, Command(NONE, 0.0, 0.0))
@@ -119,12 +120,13 @@ def kick_close(w, f, p, angle, distance):
     """
     c, s = w.constants, stance(w, f, p)
     reach = c.touch_distance + c.kickable_margin * distance
-    want_x = s.x + s.vx + reach * math.cos(s.yaw + angle) - s.ball_x - s.ball_vx
-    want_y = s.y + s.vy + reach * math.sin(s.yaw + angle) - s.ball_y - s.ball_vy
+    ux, uy = unit(s.yaw + angle)
+    want_x = s.x + s.vx + reach * ux - s.ball_x - s.ball_vx
+    want_y = s.y + s.vy + reach * uy - s.ball_y - s.ball_vy
     power = length(want_x, want_y) / _rate(c, s)
     if power > 100.0 and length(s.ball_vx, s.ball_vy) > 0.1:
         return freeze_ball(w, f, p)
-    return Command(KICK, min(power, 100.0), wrap(math.atan2(want_y, want_x) - s.yaw))
+    return Command(KICK, min(power, 100.0), wrap(bearing(want_x, want_y) - s.yaw))
 
 
 @compiled
@@ -132,7 +134,7 @@ def freeze_ball(w, f, p):
     """Stop the ball where it is, or bring it back within reach (P: freezeBall)."""
     c, s = w.constants, stance(w, f, p)
     power = min(length(s.ball_vx, s.ball_vy) / _rate(c, s), 100.0)
-    angle = wrap(math.atan2(s.ball_vy, s.ball_vx) + math.pi - s.yaw)
+    angle = wrap(bearing(s.ball_vx, s.ball_vy) + math.pi - s.yaw)
     kick = Command(KICK, power, angle)
     next_x, next_y = ball_after(w, f, p, kick)
     if length(next_x - s.x - s.vx, next_y - s.y - s.vy) < FREEZE_SHARE * c.kickable_distance:
@@ -140,9 +142,9 @@ def freeze_ball(w, f, p):
     rel_x, rel_y = s.ball_x - s.x - s.vx, s.ball_y - s.y - s.vy
     rest = length(rel_x, rel_y)
     reach = min(SAFE_REACH * c.kickable_distance, rest - 0.1)
-    direction = math.atan2(rel_y, rel_x)
-    to_x = s.x + s.vx + reach * math.cos(direction)
-    to_y = s.y + s.vy + reach * math.sin(direction)
+    ux, uy = unit(bearing(rel_x, rel_y))
+    to_x = s.x + s.vx + reach * ux
+    to_y = s.y + s.vy + reach * uy
     return accelerate_ball(w, f, p, to_x - s.ball_x, to_y - s.ball_y)
 
 
@@ -154,24 +156,28 @@ def accelerate_ball(w, f, p, want_x, want_y):
     ax, ay = want_x - s.ball_vx, want_y - s.ball_vy
     size = length(ax, ay)
     if size < c.ball_accel_max and size / rate <= 100.0:
-        return Command(KICK, size / rate, wrap(math.atan2(ay, ax) - s.yaw))
-    angle = _full_power_angle(s, math.atan2(want_y, want_x), rate)
+        return Command(KICK, size / rate, wrap(bearing(ax, ay) - s.yaw))
+    angle = _full_power_angle(s, bearing(want_x, want_y), rate)
     return Command(KICK, 100.0, wrap(angle - s.yaw))
 
 
 @compiled
 def _full_power_angle(s, direction, rate):
     """Where to kick with full power so that the ball leaves in a direction [rad, field axes]."""
-    across = -math.sin(direction) * s.ball_vx + math.cos(direction) * s.ball_vy
-    return direction - math.asin(clip(across / (100.0 * rate), -1.0, 1.0))
+    ux, uy = unit(direction)
+    across = clip((ux * s.ball_vy - uy * s.ball_vx) / (100.0 * rate), -1.0, 1.0)
+    return direction - bearing(math.sqrt(1.0 - across * across), across)
 
 
 @compiled
 def pass_speed(c, distance, end_speed):
     """First speed of a ball that covers `distance` and then has `end_speed` (whole cycles)."""
     growth = 1.0 / c.ball_decay
-    steps = math.log(1.0 - distance / end_speed * (1.0 - growth)) / math.log(growth)
-    return end_speed * growth ** round(steps)
+    needed = 1.0 + distance / end_speed * (growth - 1.0)  # so many times as fast it must be
+    grown, half = 1.0, math.sqrt(growth)
+    while grown * half < needed:
+        grown *= growth
+    return end_speed * grown
 
 
 @compiled
@@ -181,9 +187,9 @@ def kick_to(w, f, p, x, y, end_speed):
     P: kickTo.
     """
     c, s = w.constants, stance(w, f, p)
-    direction = math.atan2(y - s.ball_y, x - s.ball_x)
+    direction = bearing(x - s.ball_x, y - s.ball_y)
     speed = pass_speed(c, length(x - s.ball_x, y - s.ball_y), end_speed)
-    cosine, sine = math.cos(direction), math.sin(direction)
+    cosine, sine = unit(direction)
     gap_x = s.x + s.vx - s.ball_x - speed * cosine
     gap_y = s.y + s.vy - s.ball_y - speed * sine
     if length(gap_x, gap_y) < c.touch_distance:  # the kick would hit the own body
@@ -204,10 +210,11 @@ def _kick_unreachable(w, f, p, direction, speed):
     c, s = w.constants, stance(w, f, p)
     rate = _rate(c, s)
     angle = _full_power_angle(s, direction, rate)
-    gain_x, gain_y = 100.0 * rate * math.cos(angle), 100.0 * rate * math.sin(angle)
-    reached = length(s.ball_vx + gain_x, s.ball_vy + gain_y)
+    ux, uy = unit(angle)
+    reached = length(s.ball_vx + 100.0 * rate * ux, s.ball_vy + 100.0 * rate * uy)
     if reached > c.when_to_kick * c.ball_accel_max:
-        return accelerate_ball(w, f, p, speed * math.cos(direction), speed * math.sin(direction))
+        ux, uy = unit(direction)
+        return accelerate_ball(w, f, p, speed * ux, speed * uy)
     if rate > c.when_to_kick * c.kick_power_rate:
         return freeze_ball(w, f, p)
     return kick_close(w, f, p, 0.0, c.setup_distance)

@@ -18,6 +18,7 @@ from keepaway_sim.world.skills.prediction import (
 )
 from keepaway_sim.world.skills.running import dash_to, direction_of_play, turn_body_along
 from keepaway_sim.world.state import DASH, NONE, TURN, Command
+from keepaway_sim.world.trigonometry import bearing, unit
 
 CLOSE_RANGE = 3.0  # [m] an opponent so near makes a player take the ball at once
 FACING = math.radians(25.0)  # [rad] faces its direction of play well enough
@@ -43,7 +44,7 @@ def intercept(w, f, p):
         return turn_body_along(w, f, p, direction_of_play(c, p))
     turns, wx, wy = heading_to_go(c, body, to_x, to_y, cycles)
     if turns:
-        angle = math.atan2(ux * wy - uy * wx, ux * wx + uy * wy)
+        angle = bearing(ux * wx + uy * wy, ux * wy - uy * wx)
         return Command(TURN, 0.0, turn_moment(c, angle, length(vx, vy)))
     return dash_to(w, f, p, to_x, to_y, max(cycles, 1))
 
@@ -83,8 +84,9 @@ def meet_closely(w, f, p):
                 return turn
     if abs(wrap(forward - yaw)) > FACING:
         kind, stop, _ = dash_to(w, f, p, px, py, 1)
-        sx = px + vx + c.dash_power_rate * stop * math.cos(yaw)
-        sy = py + vy + c.dash_power_rate * stop * math.sin(yaw)
+        ahead_x, ahead_y = unit(yaw)
+        sx = px + vx + c.dash_power_rate * stop * ahead_x
+        sy = py + vy + c.dash_power_rate * stop * ahead_y
         ball_roll = c.ball_roll[2]
         if length(sx - bx - ball_roll * ux, sy - by - ball_roll * uy) < within:
             return Command(kind, stop, 0.0)
@@ -107,7 +109,7 @@ def _one_dash(w, f, p):
     px, py = belief.position[f, p, p]
     vx, vy = belief.velocity[f, p, p]
     yaw = belief.body[f, p, p]
-    cosine, sine = math.cos(yaw), math.sin(yaw)
+    cosine, sine = unit(yaw)
     bx = belief.position[f, p, ball, 0] + belief.velocity[f, p, ball, 0]
     by = belief.position[f, p, ball, 1] + belief.velocity[f, p, ball, 1]
     speed = cosine * vx + sine * vy

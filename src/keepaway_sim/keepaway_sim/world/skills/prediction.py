@@ -12,6 +12,7 @@ from typing import NamedTuple
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER, ROLL_CYCLES
 from keepaway_sim.world.geometry import clip, length
+from keepaway_sim.world.trigonometry import unit
 
 LOOK_AHEAD = 4  # [cycles] P: a player rolls out so long before a turn is judged
 SAME_POINT = 1.0  # [m] P: a new meeting point so near the old one is the old one
@@ -58,7 +59,8 @@ def body_of(w, f, p, j):
     x, y = w.belief.position[f, p, j]
     vx, vy = w.belief.velocity[f, p, j]
     yaw = w.belief.body[f, p, j]
-    return Body(x, y, vx, vy, math.cos(yaw), math.sin(yaw))
+    ux, uy = unit(yaw)
+    return Body(x, y, vx, vy, ux, uy)
 
 
 @compiled
@@ -149,7 +151,7 @@ def _turned(ux, uy, to_x, to_y, most):
     ahead = ux * to_x + uy * to_y
     if most > 3.0 or (most > 1.6 and ahead >= 0.0):  # slow players turn anywhere, or half round
         return to_x, to_y
-    cosine = math.cos(most)
+    cosine, _ = unit(most)
     if ahead >= cosine:
         return to_x, to_y
     sine = math.sqrt(1.0 - cosine * cosine)

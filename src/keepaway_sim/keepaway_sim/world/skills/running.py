@@ -9,6 +9,7 @@ from keepaway_sim.world.geometry import length, wrap
 from keepaway_sim.world.physics import dash_acceleration
 from keepaway_sim.world.skills.prediction import dash_power, turn_moment
 from keepaway_sim.world.state import DASH, TURN, Command
+from keepaway_sim.world.trigonometry import bearing, unit
 
 
 @compiled
@@ -40,7 +41,7 @@ def turn_body_to(w, f, p, x, y, cycles):
     px, py = belief.position[f, p, p]
     vx, vy = belief.velocity[f, p, p]
     roll = c.player_roll[cycles]
-    angle = wrap(math.atan2(y - py - roll * vy, x - px - roll * vx) - belief.body[f, p, p])
+    angle = wrap(bearing(x - px - roll * vx, y - py - roll * vy) - belief.body[f, p, p])
     return Command(TURN, 0.0, turn_moment(c, angle, length(vx, vy)))
 
 
@@ -49,10 +50,8 @@ def turn_body_along(w, f, p, direction):
     """Turn toward a global direction."""
     belief = w.belief
     x, y = belief.position[f, p, p]
-    reach = 1.0
-    return turn_body_to(
-        w, f, p, x + reach * math.cos(direction), y + reach * math.sin(direction), 1
-    )
+    ux, uy = unit(direction)
+    return turn_body_to(w, f, p, x + ux, y + uy, 1)
 
 
 @compiled
@@ -61,7 +60,7 @@ def dash_to(w, f, p, x, y, cycles):
     c, belief = w.constants, w.belief
     px, py = belief.position[f, p, p]
     vx, vy = belief.velocity[f, p, p]
-    cosine, sine = math.cos(belief.body[f, p, p]), math.sin(belief.body[f, p, p])
+    cosine, sine = unit(belief.body[f, p, p])
     along = cosine * (x - px) + sine * (y - py)
     return Command(DASH, dash_power(c, along, cosine * vx + sine * vy, cycles), 0.0)
 
@@ -73,7 +72,7 @@ def move_to(w, f, p, x, y, when_to_turn, back_distance):
     px, py = belief.position[f, p, p]
     vx, vy = belief.velocity[f, p, p]
     roll = 1.0 / (1.0 - c.player_decay)
-    angle = wrap(math.atan2(y - py - roll * vy, x - px - roll * vx) - belief.body[f, p, p])
+    angle = wrap(bearing(x - px - roll * vx, y - py - roll * vy) - belief.body[f, p, p])
     back = wrap(angle + math.pi)
     away = length(x - px, y - py)
     if abs(angle) < when_to_turn or (abs(back) < when_to_turn and away < back_distance):
@@ -98,7 +97,7 @@ def search(w, f, p):
         ball = w.ball
         dx = belief.position[f, p, ball, 0] - belief.position[f, p, p, 0]
         dy = belief.position[f, p, ball, 1] - belief.position[f, p, p, 1]
-        left = wrap(math.atan2(dy, dx) - belief.body[f, p, p]) >= 0.0
+        left = wrap(bearing(dx, dy) - belief.body[f, p, p]) >= 0.0
         memory.search_sign[f, p] = 1.0 if left else -1.0
     memory.search_cycle[f, p] = now
     belief.neck[f, p] = 0.0

@@ -29,6 +29,7 @@ from keepaway_sim.world.skills.running import (
     turn_body_to,
 )
 from keepaway_sim.world.state import DASH, Command
+from keepaway_sim.world.trigonometry import bearing, unit
 
 _HOLD = int(Action.HOLD_BALL)
 _PASS = int(Action.PASS_BALL)
@@ -276,12 +277,11 @@ def mark_keeper(w, f, p, keeper):
     kx, ky = belief.position[f, p, keeper]
     bx, by = belief.position[f, p, ball]
     lead_x = kx + MARK_LEAD
-    direction = math.atan2(by - ky, bx - lead_x)
-    x = lead_x + c.mark_distance * math.cos(direction)
-    y = ky + c.mark_distance * math.sin(direction)
+    ux, uy = unit(bearing(bx - lead_x, by - ky))
+    x, y = lead_x + c.mark_distance * ux, ky + c.mark_distance * uy
     if length(x - px, y - py) >= MARK_NEAR:
         return move_to(w, f, p, x, y, c.mark_turn_angle, c.mark_back_distance)
-    to_keeper = math.atan2(ky - py, kx - px)
-    to_ball = math.atan2(by - py, bx - px)
+    to_keeper = bearing(kx - px, ky - py)
+    to_ball = bearing(bx - px, by - py)
     left = wrap(to_ball - to_keeper) >= 0.0
     return turn_body_along(w, f, p, to_keeper + (MARK_SIDEWAYS if left else -MARK_SIDEWAYS))
