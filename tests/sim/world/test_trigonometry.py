@@ -11,7 +11,7 @@ from keepaway_sim.world import machine_code, trigonometry
 from keepaway_sim.world.trigonometry import bearing, unit
 
 ANGLES = [*np.linspace(-10.0, 10.0, 40_001), *(k * math.pi / 4 for k in range(-40, 41))]
-EXACT = {"degrees", "inf", "int64", "isnan", "nan", "pi", "radians", "sqrt"}
+EXACT = {"degrees", "float32", "floor", "inf", "int64", "isnan", "nan", "pi", "radians", "sqrt"}
 """What of `math` and `np` gives the same bits everywhere."""
 
 

@@ -37,11 +37,13 @@ _DERIVED = (
     "direction_cosine",  # of every direction that is seen, from -pi to pi
     "direction_sine",
     "phantom_slots",  # beside the smaller team's own, see `phantoms`
-    "open_x",  # (25,) [m] the points where a keeper may get open
+    "open_x",  # (OPEN_LANES,) float32 [m] the NUM_OPEN points where a keeper may get open
     "open_y",
 )
 OPPONENT_SLOTS = 11  # P: MAX_OPPONENTS
 OPEN_POINTS = 5  # P: a side of the grid of points where a keeper may get open
+NUM_OPEN = OPEN_POINTS**2
+OPEN_LANES = 32  # the same, up to a multiple of what one instruction serves
 
 
 # Made once, under its own name in this module: numba's cache on disk must find it again.
@@ -87,7 +89,11 @@ def _open_points(task: Task, border: float) -> dict[str, np.ndarray]:
     """The grid of points where a keeper may get open, `border` of a side away from the edge."""
     share = np.linspace(-0.5, 0.5, OPEN_POINTS) * (1.0 - 2.0 * border)
     x, y = np.meshgrid(task.field_length * share, -task.field_width * share, indexing="ij")
-    return {"open_x": x.ravel(), "open_y": y.ravel()}
+    rest = OPEN_LANES - NUM_OPEN
+    return {
+        name: np.pad(points.ravel().astype(np.float32), (0, rest))
+        for name, points in (("open_x", x), ("open_y", y))
+    }
 
 
 def _roll_table(decay: float) -> np.ndarray:

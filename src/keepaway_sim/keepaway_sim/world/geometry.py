@@ -54,9 +54,6 @@ def cone_contains(x, y, start_x, start_y, end_x, end_y, width):
     point_x, point_y = x - start_x, y - start_y
     square = axis_x * axis_x + axis_y * axis_y
     along = axis_x * point_x + axis_y * point_y
-    if along <= 0.0 or along >= square:
-        return False
-    if point_x * point_x + point_y * point_y >= square:
-        return False
     across = axis_x * point_y - axis_y * point_x
-    return abs(across) < width * along
+    near = (along < square) & (point_x * point_x + point_y * point_y < square)
+    return (along > 0.0) & near & (abs(across) < width * along)

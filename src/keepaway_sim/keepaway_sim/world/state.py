@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from keepaway_sim.world.config import NEVER
+from keepaway_sim.world.constants import OPEN_LANES
 from keepaway_sim.world.passing import record
 from keepaway_sim.world.streams import Draws
 
@@ -146,7 +147,7 @@ class Scratch(NamedTuple):
     pushed_to: np.ndarray  # (P + 1, 2) [m] sum of the places to which a disc is pushed
     num_pushes: np.ndarray  # (P + 1,)
     collided: np.ndarray  # (P + 1,) bool
-    congestion: np.ndarray  # (25,) [1/m] of the points where a keeper may get open
+    congestion: np.ndarray  # (OPEN_LANES,) float32 [1/m] of the points where a keeper may get open
     felt: np.ndarray  # (P, 3) [m] x, y, distance of a player who is only felt; NaN: not felt
     numbers: np.ndarray  # (P, 2) int64 the numbers that it may have, from .. to
 
@@ -190,7 +191,7 @@ def make_fields(constants: Any, bodies: Discs, random: Draws) -> Fields:
             pushed_to=np.zeros((objects, 2)),
             num_pushes=np.zeros(objects),
             collided=np.zeros(objects, dtype=np.bool_),
-            congestion=np.zeros(len(constants.open_x)),
+            congestion=np.zeros(OPEN_LANES, dtype=np.float32),
             felt=np.zeros((num_players, 3)),
             numbers=np.zeros((num_players, 2), dtype=np.int64),
         ),

@@ -12,9 +12,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from keepaway_sim.task import Action
 from keepaway_sim.world.compiled import compiled
 from keepaway_sim.world.config import NEVER
+from keepaway_sim.world.constants import NUM_OPEN, OPEN_LANES
 from keepaway_sim.world.geometry import TWO_PI, cone_contains, length, wrap
 from keepaway_sim.world.phantoms import age_of, num_opponents, opponent, place_of
 from keepaway_sim.world.sight import turn_neck
@@ -36,6 +39,8 @@ _PASS = int(Action.PASS_BALL)
 _OPEN = int(Action.GET_OPEN)
 _MARK = int(Action.MARK_KEEPER)
 
+ONE, INFINITE = np.float32(1.0), np.float32(math.inf)
+NO_DISTANCE = np.float32(1e-18)  # [m^2] keeps a player on a point from an infinite congestion
 AT_REST = 0.01  # [m/cycle] a slower player did not move
 MARK_NEAR = 2.0  # [m] at the marking place: stand sideways
 MARK_SIDEWAYS = math.radians(80.0)
@@ -187,42 +192,43 @@ def open_point(w, f, p, from_x, from_y):
     """The point of a 5 x 5 grid with least congestion and no taker in the lane to it.
 
     Congestion is the sum over all other players of 1 / distance. The centre if every lane is
-    blocked.
+    blocked. See docs/vector_code.md.
     """
     c, congestion = w.constants, w.scratch.congestion
-    x, y = c.open_x, c.open_y
     congestion[:] = 0.0
     for j in range(w.ball + 1 + c.phantom_slots):
-        if j in (p, w.ball) or age_of(w, f, p, j) > c.player_lost_age:
-            continue
-        px, py = place_of(w, f, p, j)
-        for k in range(len(congestion)):
-            dx, dy = px - x[k], py - y[k]
-            congestion[k] += 1.0 / math.sqrt(dx * dx + dy * dy + 1e-18)
-    for _ in range(len(congestion)):
-        best = 0
-        for k in range(1, len(congestion)):
-            if congestion[k] < congestion[best]:
-                best = k
-        if congestion[best] == math.inf:
-            break
-        if not _lane_blocked(w, f, p, from_x, from_y, x[best], y[best]):
-            return x[best], y[best]
-        congestion[best] = math.inf
-    return 0.0, 0.0
+        if j not in (p, w.ball) and age_of(w, f, p, j) <= c.player_lost_age:
+            _add_congestion(c, place_of(w, f, p, j), congestion)
+    for k in range(num_opponents(w, p)):
+        j = opponent(w, p, k)
+        if age_of(w, f, p, j) <= c.player_lost_age:
+            _block_lanes(c, place_of(w, f, p, j), from_x, from_y, congestion)
+    best = 0
+    for k in range(1, NUM_OPEN):
+        if congestion[k] < congestion[best]:
+            best = k
+    if congestion[best] == math.inf:
+        return 0.0, 0.0
+    return c.open_x[best], c.open_y[best]
 
 
 @compiled
-def _lane_blocked(w, f, p, from_x, from_y, x, y):
-    c = w.constants
-    for k in range(num_opponents(w, p)):
-        j = opponent(w, p, k)
-        if age_of(w, f, p, j) > c.player_lost_age:
-            continue
-        ox, oy = place_of(w, f, p, j)
-        if cone_contains(ox, oy, from_x, from_y, x, y, c.cone_width):
-            return True
-    return False
+def _add_congestion(c, place, congestion):
+    """Add 1 / distance of a player to every point, in single precision."""
+    x, y = np.float32(place[0]), np.float32(place[1])
+    for k in range(OPEN_LANES):
+        dx, dy = x - c.open_x[k], y - c.open_y[k]
+        congestion[k] += ONE / math.sqrt(dx * dx + dy * dy + NO_DISTANCE)
+
+
+@compiled
+def _block_lanes(c, place, from_x, from_y, congestion):
+    """No point is worth going to if a taker stands in the lane to it."""
+    x, y = np.float32(place[0]), np.float32(place[1])
+    from_x, from_y, width = np.float32(from_x), np.float32(from_y), np.float32(c.cone_width)
+    for k in range(OPEN_LANES):
+        blocked = cone_contains(x, y, from_x, from_y, c.open_x[k], c.open_y[k], width)
+        congestion[k] = INFINITE if blocked else congestion[k]
 
 
 @compiled
