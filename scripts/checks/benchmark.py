@@ -30,6 +30,7 @@ import pymunk
 import pymunk.batch
 from benchmark_ros import first_cycle, measure_ros
 from performance_page import keep
+from trainer_speed import play
 
 from keepaway_sim.version import code_version
 
@@ -162,18 +163,6 @@ def trainer_time(task: str, policy: str, num_fields: int, cycles: int) -> float:
     return spent * 1e6 / played
 
 
-def play(trainer: Any, policy: str, num_fields: int, cycles: int) -> tuple[float, int]:
-    """CPU seconds and field-cycles of a trial on every field."""
-    from keepaway_agent.training.trial import StopRule, Trial, trial_seed
-
-    trials = (
-        Trial(trial_seed(1, k), StopRule(max_cycles=cycles), policy) for k in range(num_fields)
-    )
-    start = time.process_time()
-    played = sum(int(result.durations.sum()) for result in trainer.run(trials))
-    return time.process_time() - start, played
-
-
 def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
     """Where learning's CPU microseconds go, per field-cycle: the parts of a cycle, and the rest."""
     from keepaway_agent.training.trainer import Trainer
@@ -202,8 +191,7 @@ def phases(task: str, num_fields: int, cycles: int) -> dict[str, float]:
     watch(world._streams, "refill", "random")
     watch(trainer._streams, "refill", "random")
     play(trainer, "learn", num_fields, 300)
-    spent.clear()
-    whole, played = play(trainer, "learn", num_fields, cycles)
+    whole, played = play(trainer, "learn", num_fields, cycles, begin=spent.clear)
     spent["rest"] = whole - sum(spent.values())
     return {f"{task}_{phase}_us": time * 1e6 / played for phase, time in spent.items()}
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import trainer_speed
 from environment_page import keep, made_here, speed
 
 from keepaway_agent.environments import (
@@ -25,22 +26,27 @@ from keepaway_agent.environments import (
     KeeperVectorEnv,
 )
 from keepaway_agent.training.trainer import Trainer
-from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
+from keepaway_agent.training.trial import TrainerConfig
 
-Play = Callable[[int], int]
-"""Plays at least N cycles on each field; returns the number of cycles of all fields."""
+Play = Callable[[int], tuple[float, int]]
+"""Plays at least N cycles on each field; returns CPU seconds and the cycles of all fields."""
 
 
 def trainer(num_fields: int, policy: str = "random") -> Play:
-    """The trainer's own loop, without learning."""
-    own, seeds = Trainer(TrainerConfig(), num_fields), iter(range(10**9))
+    """The trainer's own loop, without learning; the start of trials is left out."""
+    own = Trainer(TrainerConfig(), num_fields)
+    return lambda cycles: trainer_speed.play(own, policy, num_fields, cycles)
 
-    def play(cycles: int) -> int:
-        rule, seed = StopRule(max_cycles=cycles), next(seeds)
-        trials = [Trial(trial_seed(seed, k), rule, policy) for k in range(num_fields)]
-        return sum(int(result.durations.sum()) for result in own.run(trials))
 
-    return play
+def timed(play: Callable[[int], int]) -> Play:
+    """The time that a function takes, and the cycles that it gives."""
+
+    def timed_play(cycles: int) -> tuple[float, int]:
+        began = time.process_time()
+        played = play(cycles)
+        return time.process_time() - began, played
+
+    return timed_play
 
 
 def vector(num_fields: int, wait_for: str, policy: str = "random") -> Play:
@@ -55,7 +61,7 @@ def vector(num_fields: int, wait_for: str, policy: str = "random") -> Play:
             played += int(infos["cycle"][ended].sum())
         return played
 
-    return play
+    return timed(play)
 
 
 def _choices(num_fields: int, policy: str) -> Iterator[np.ndarray]:
@@ -78,7 +84,7 @@ def single() -> Play:
             played += info["cycle"]
         return played
 
-    return play
+    return timed(play)
 
 
 def turns(teams: str) -> Play:
@@ -97,7 +103,7 @@ def turns(teams: str) -> Play:
             played += cycle
         return played
 
-    return play
+    return timed(play)
 
 
 def parallel() -> Play:
@@ -113,7 +119,7 @@ def parallel() -> Play:
                 played += 1
         return played
 
-    return play
+    return timed(play)
 
 
 def _many(num_fields: int, policy: str) -> dict[str, Callable[[], Play]]:
@@ -145,10 +151,9 @@ def measure(group: dict[str, Callable[[], Play]], cycles: int, rounds: int) -> d
     spent, played = dict.fromkeys(plays, 0.0), dict.fromkeys(plays, 0)
     for count in range(rounds + 1):
         for name, play in plays.items():
-            began = time.process_time()
-            done = play(cycles)
+            seconds, done = play(cycles)
             if count:
-                spent[name] += time.process_time() - began
+                spent[name] += seconds
                 played[name] += done
     return {name: played[name] / spent[name] for name in plays}
 
