@@ -198,7 +198,9 @@ def transfer_by_node(source: Path, target: Path) -> str:
 
     from keepaway_msgs.srv import ApplyRho
 
-    command = [sys.executable, str(SCRIPTS / "transfer.py"), "node"]
+    source, target = source.resolve(), target.resolve()
+    folder = f"weights_dir:={json.dumps(str(target.parent))}"
+    command = [sys.executable, str(SCRIPTS / "transfer.py"), "node", "--ros-args", "-p", folder]
     with subprocess.Popen(command) as process:
         rclpy.init()
         node = rclpy.create_node("demo")

@@ -88,15 +88,22 @@ def _parse() -> argparse.Namespace:
     mapping.add_argument("source", help="for example 3v2")
     mapping.add_argument("target", help="for example 4v3")
     mapping.set_defaults(run=_mapping)
-    node = commands.add_parser("node", help="a ROS 2 node that carries weights over when asked")
-    node.add_argument("ros", nargs=argparse.REMAINDER, help="--ros-args and what follows it")
+    node = commands.add_parser(
+        "node",
+        help="a ROS 2 node that carries weights over when asked",
+        usage="%(prog)s [--ros-args ..]",
+    )
     node.set_defaults(run=_node)
     for command in (apply, mapping):
         command.add_argument(
             "--variant", default="rho", metavar="NAME[@SECONDS]", help=f"{', '.join(VARIANTS)}"
         )
         command.add_argument("--seed", type=int, default=0, help="of the shuffled mapping")
-    return parser.parse_args()
+    arguments, ros = parser.parse_known_args()
+    if ros and arguments.run != _node:
+        parser.error(f"unrecognized arguments: {shlex.join(ros)}")
+    arguments.ros = ros
+    return arguments
 
 
 if __name__ == "__main__":

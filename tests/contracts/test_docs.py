@@ -1,5 +1,6 @@
 """What the documentation promises: links lead somewhere, commands exist, tutorials run."""
 
+import ast
 import functools
 import os
 import re
@@ -17,6 +18,7 @@ PAGES = sorted(
     for pattern in ("*.md", ".github/**/*.md", "msgs/*.md", "src/*/README.md", "src/*/docs/*.md")
     for page in ROOT.glob(pattern)
 )
+SCRIPTS = sorted((ROOT / "scripts").glob("*.py"))
 TUTORIALS = [
     "README.md",
     "src/keepaway_transfer/docs/tutorial.md",
@@ -51,9 +53,11 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
 
 
 def commands(page: Path) -> Iterator[list[str]]:
-    """The words of every command of a page that begins with a script of this project."""
+    """The words of every command that begins with a script, of a page or a script's docstring."""
     text = page.read_text(encoding="utf-8")
     blocks = re.findall(r"^```(?:sh)?\n(.*?)^```", text, re.M | re.S)
+    if page.suffix == ".py":
+        blocks, text = [ast.get_docstring(ast.parse(text)) or ""], ""
     inline = re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.S))
     for line in [*"\n".join(blocks).splitlines(), *inline]:
         found = re.search(r"(?:^|[\s=])(scripts/[\w/]+(?:\.py)?(?=\s|$).*)", line)
@@ -72,7 +76,7 @@ def help_of(script: Path) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
+@pytest.mark.parametrize("page", [*PAGES, *SCRIPTS], ids=name_of)
 def test_every_command_has_its_script_and_every_option_is_known(page: Path) -> None:
     unknown = []
     for name, *words in commands(page):

@@ -4,6 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from keepaway_agent.learning.weights import load_weights, save_weights
+
 SCRIPT = Path(__file__).parents[2] / "scripts/demo.py"
 
 
@@ -51,6 +55,23 @@ def test_a_place_that_is_no_folder_is_refused_in_one_line(tmp_path: Path) -> Non
     done = demo("--out", tmp_path / "file")
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_weights_are_carried_over_in_any_folder(tmp_path: Path) -> None:
+    from graph import weights_of  # it imports rclpy
+
+    source, target = (
+        tmp_path / "a: b" / "trial_0000" / "keeper_1.npz",
+        tmp_path / "a: b" / "4v3.npz",
+    )
+    source.parent.mkdir(parents=True)
+    save_weights(source, weights_of())
+    code = "import demo, pathlib, sys; demo.transfer_by_node(*map(pathlib.Path, sys.argv[1:]))"
+    command = [sys.executable, "-c", code, str(source), str(target)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=SCRIPT.parent)
+    assert done.returncode == 0, done.stderr
+    assert load_weights(target).task == "4v3"
 
 
 def test_the_tables_errors_are_by_trial() -> None:

@@ -62,3 +62,15 @@ def test_a_level_is_set_behind_the_variants_name(keeper, tmp_path):
     transfer("apply", keeper, "4v3", "--variant", "optimistic@5", "--out", out)
     (weight,) = np.unique(load_weights(out).values)
     assert weight * 19 * 32 / 10 == pytest.approx(5.0)  # all active tiles, in seconds
+
+
+def test_only_the_node_takes_arguments_of_ros(keeper, tmp_path):
+    done = transfer(
+        "apply", keeper, "4v3", "--out", tmp_path / "start.npz", "--ros-args", "-p", "x"
+    )
+    assert done.returncode == 2
+    assert done.stderr.endswith("unrecognized arguments: --ros-args -p x\n")
+    done = transfer("node", "--ros-args", "--nonsense")
+    assert done.returncode == 1
+    assert done.stderr.startswith("transfer: not understood after --ros-args: ")
+    assert "--nonsense" in done.stderr
