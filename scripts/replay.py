@@ -37,6 +37,7 @@ from keepaway_sim.cli.interrupts import Stopped
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.replayer import Replayer, ReplayerSettings, stoppable
+from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.version import code_version
 from keepaway_sim.wire.messages import SECOND
 
@@ -51,6 +52,7 @@ def main() -> int:
         options = parser().parse_args()
         return check(Path(options.path), getattr(options, "match", 0))
     arguments = parse_node_arguments(parser(), sys.argv[1:])
+    check_arguments("replay", (), arguments)
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         replayer, executor = Replayer(), EventsExecutor()

@@ -26,6 +26,7 @@ from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.spectator import DRAIN_PERIOD, Spectator
+from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.view.page import replay_page
 from keepaway_sim.view.server import Server
 from keepaway_sim.world.config import CYCLE_TIME
@@ -59,6 +60,7 @@ def main() -> int:
 
 def watch(host: str, port: int, ros: list[str]) -> int:
     """Serve the page of the match that is on, until a signal ends it; the exit code."""
+    check_arguments("view", (), ros)
     try:
         server = Server(host, port)
     except (OSError, OverflowError) as error:

@@ -106,12 +106,16 @@ def _is_compiling(frame: FrameType | None) -> bool:
 
 
 def check_arguments(name: str, settings: Sequence[type], args: Sequence[str]) -> None:
-    """Answer `--help`, and refuse what is not ROS's.
+    """Answer `--help`, and refuse what is not ROS's, or what ROS itself does not understand.
 
     Raises:
         SystemExit: after the help (0), or because of an argument that nothing would read (1).
     """
-    own = remove_ros_args(["", *args])[1:]
+    try:
+        own = remove_ros_args(["", *args])[1:]
+    except RuntimeError as error:  # behind the reason: a place in the C sources
+        reason = str(error).removeprefix("Failed to parse ROS arguments: ").partition(", at /")[0]
+        raise SystemExit(f"{name}: not understood after --ros-args: {reason}") from error
     if {"-h", "--help"} & set(own):
         print(usage(name, settings))  # noqa: T201
         raise SystemExit(0)
