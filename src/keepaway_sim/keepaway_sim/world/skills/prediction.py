@@ -22,6 +22,7 @@ KEEP_HORIZON = 20  # [cycles] P: so much later than the first point the old one 
 UNKNOWN_SPEED = 0.3  # [m/cycle] P: speed of a player not seen moving lately
 TURNS = 3  # [cycles] of turning that a player may be spared where the ball comes its way
 ROUNDING = 1e-6  # [m] more than all rounding of a distance
+ALMOST_ONE = 1.0 - 1e-9  # [cycles] makes `int` round up, but for rounding errors
 MOVING_BALL = 0.6  # [m/cycle] P: slower balls need no old meeting point
 
 
@@ -349,7 +350,7 @@ def straight_run(c, body, lead, ball, limit):
             return i
         coming = max(-(rel_x * ball.vx + rel_y * ball.vy) / distance, 0.0)
         left = _left_of_speed(c, c.ball_roll[i])
-        i += max(int(gap / (c.top_speed + coming * left)), 1)
+        i += max(int(gap / (c.top_speed + coming * left) + ALMOST_ONE), 1)
     return i
 
 
