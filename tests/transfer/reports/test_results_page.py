@@ -13,6 +13,7 @@ import pytest
 from scipy import stats
 
 from keepaway_transfer.reports.evidence import read_evidence
+from keepaway_transfer.reports.never_hurts import TABLES
 from keepaway_transfer.reports.page import page
 
 PACKAGE = Path(__file__).parents[3] / "src/keepaway_transfer"
@@ -129,6 +130,28 @@ def test_each_verdict_comes_out_again_by_scipy_alone(name, reference):
     for row, ending in zip(names, lines, strict=True):
         pattern = rf"^\| {re.escape(row)} \|.*{re.escape(ending)}$"
         assert re.search(pattern, text, re.MULTILINE), f"{row}: {ending}"
+
+
+@pytest.mark.parametrize("name", [name for name in STUDIES if name in TABLES])
+@pytest.mark.parametrize("measure", ["target", "total"])
+def test_the_best_row_against_the_best_optimistic_start_comes_out_again_by_scipy(name, measure):
+    _, starts = hours_of("optimistic")
+    _, trials = hours_of(name)
+    level = starts["target"].groupby("row").mean().idxmin()
+    means = trials.drop("0")[measure].groupby("row").mean()
+    found = {
+        row: stats.ttest_ind(starts.loc[level][measure], trials.loc[row][measure], equal_var=False)
+        for row in means.index
+    }
+    p_values = dict(zip(found, holm_by_hand([one.pvalue for one in found.values()]), strict=True))
+    best = means.idxmin()
+    interval = found[best].confidence_interval()
+    saved = starts.loc[level][measure].mean() - means[best]
+    verdict = verdict_by_hand(saved, interval.low, interval.high, p_values[best])
+    cells = f"after {best}: {saved:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
+    line = re.search(rf"^\| `{name}` \| .*$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert line
+    assert f"| {cells} | {p_values[best]:.2g} | {verdict} |" in line[0]
 
 
 def test_as_many_trials_as_the_page_says_resolve_two_hours_at_80_percent_power():

@@ -11,6 +11,7 @@ from keepaway_transfer.reports.evidence import (
     difference,
     scratch_difference,
 )
+from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT, never_hurts
 from keepaway_transfer.reports.page_elsewhere import PAPER, others, real_server
 from keepaway_transfer.reports.page_parts import (
     Lines,
@@ -26,9 +27,7 @@ from keepaway_transfer.reports.report import power, spread
 from keepaway_transfer.reports.statistics import holm
 from keepaway_transfer.reports.summary import verdict
 
-TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled")
 LOWER_THRESHOLD = 8.2  # [s] at which Table 2 is measured a second time
-NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
 
 
 def page(studies: Studies) -> str:
@@ -47,7 +46,7 @@ def page(studies: Studies) -> str:
         ["## What too much training does, and why", "", *_overtraining(studies)],
         ["## What the real server showed", "", *real_server(measured["real_server"])],
         ["## What others measured", "", *others(measured["others"])],
-        ["## A transfer that never hurts", "", *_never_hurts(studies)],
+        ["## A transfer that never hurts", "", *never_hurts(studies)],
         ["## The data", "", *_data(studies)],
         ["## How the figures changed", "", *_history(studies)],
     ]
@@ -304,50 +303,6 @@ def _lower_level(one: Evidence) -> Lines:
         f" {spread(saved)} h are saved by the way of carrying alone, and {spread(gain)} h against"
         " scratch.",
     ]
-
-
-def _never_hurts(studies: Studies) -> Lines:
-    tables = [name for name in TABLES if name in studies]
-    if "optimistic" not in studies or len(tables) < 2:
-        wanted = ("optimistic", *TABLES[1:])
-        return [
-            "Looked for is a way whose 4v3 hours after 1,000, 3,000, 6,000 and 9,000 episodes are"
-            " nowhere worse than from scratch and than from the best optimistic start, and whose"
-            " best total beats that start.",
-            *not_run(*(name for name in wanted if name not in studies)),
-        ]
-    lines = [
-        "| study | nowhere worse than scratch | nowhere worse than the best optimistic start"
-        " | best total against that start (hours saved) | p over all rows | |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [_never_hurts_row(studies, name) for name in tables]
-    for name in tables:
-        if (table := studies[name]) is not studies["table2"]:
-            lines += ["", f"`{name}` against scratch:", ""]
-            lines += study_table(table, table.scratch, "episodes of 3v2")
-    return lines
-
-
-def _never_hurts_row(studies: Studies, name: str) -> str:
-    table, optimistic = studies[name], studies["optimistic"]
-    start = optimistic, optimistic.best("target")
-    names = [row for row in NEVER_WORSE_AT if row in table.rows]
-    worse = []
-    for reference in ((table, table.scratch), start):
-        saved = [difference(reference, (table, row), "target_hours") for row in names]
-        p_values = holm([one.p_value for one in saved])
-        judged = zip(names, saved, p_values, strict=True)
-        costs = [row for row, one, p in judged if verdict(one, float(p)) == "costs"]
-        worse.append(f"worse after {', '.join(costs)}" if costs else "yes")
-    sources = [row for row in table.rows if row != table.scratch]
-    totals = [difference(start, (table, row), "total_hours") for row in sources]
-    at = sources.index(table.best("total"))
-    p_value = float(holm([one.p_value for one in totals])[at])
-    return (
-        f"| `{name}` | {worse[0]} | {worse[1]} | after {sources[at]}: {spread(totals[at])}"
-        f" | {p_value:.2g} | {verdict(totals[at], p_value)} |"
-    )
 
 
 def _data(studies: Studies) -> Lines:

@@ -1,0 +1,108 @@
+"""The page's search for a transfer that never hurts, in 4v3 hours and in all hours.
+
+Looked for is a way that is nowhere worse than learning from scratch, and than the best optimistic
+start: a constant that every action is worth at the beginning, without any source.
+"""
+
+from typing import NamedTuple
+
+from keepaway_transfer.reports.evidence import Evidence, Studies, difference
+from keepaway_transfer.reports.page_parts import Lines, listed, not_run, study_table
+from keepaway_transfer.reports.report import spread
+from keepaway_transfer.reports.statistics import Comparison, holm
+from keepaway_transfer.reports.summary import verdict
+
+TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled")
+NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
+
+
+class Best(NamedTuple):
+    """A study's best row, beside the best optimistic start."""
+
+    study: str
+    row: str
+    saved: Comparison  # hours
+    p_value: float  # adjusted over all rows of the study
+    verdict: str
+
+
+def never_hurts(studies: Studies) -> Lines:
+    """The section's lines."""
+    tables = [name for name in TABLES if name in studies]
+    if "optimistic" not in studies or len(tables) < 2:
+        wanted = ("optimistic", *TABLES[1:])
+        return [
+            "Looked for is a way whose 4v3 hours after 1,000, 3,000, 6,000 and 9,000 episodes are"
+            " nowhere worse than from scratch and than from the best optimistic start, and whose"
+            " best total beats that start.",
+            *not_run(*(name for name in wanted if name not in studies)),
+        ]
+    best = {
+        measure: [best_row(studies, name, measure) for name in tables]
+        for measure in ("target", "total")
+    }
+    lines = [
+        _said("4v3 hours", best["target"]),
+        _said("hours in all", best["total"]),
+        "The best row of each study was chosen on these trials; p is adjusted over all its rows.",
+        "",
+        "| study | nowhere worse than scratch | nowhere worse than the best optimistic start"
+        " | best 4v3 hours against that start (saved) | p over all rows |"
+        " | best total against it (hours saved) | p over all rows | |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, target, total in zip(tables, best["target"], best["total"], strict=True):
+        hurts = " | ".join(_worse(studies, name))
+        lines.append(f"| `{name}` | {hurts} | {_cells(target, total)} |")
+    for name in tables:
+        if (table := studies[name]) is not studies["table2"]:
+            lines += ["", f"`{name}` against scratch:", ""]
+            lines += study_table(table, table.scratch, "episodes of 3v2")
+    return lines
+
+
+def best_row(studies: Studies, name: str, measure: str) -> Best:
+    """The row of a study with the least hours, against the best optimistic start."""
+    table, start = studies[name], _best_start(studies)
+    sources = [row for row in table.rows if row != table.scratch]
+    saved = [difference(start, (table, row), f"{measure}_hours") for row in sources]
+    at = sources.index(table.best(measure))
+    p_value = float(holm([one.p_value for one in saved])[at])
+    return Best(name, sources[at], saved[at], p_value, verdict(saved[at], p_value))
+
+
+def _worse(studies: Studies, name: str) -> list[str]:
+    """After how many episodes of 3v2 a way takes more 4v3 hours than scratch, and than optimism."""
+    table = studies[name]
+    names = [row for row in NEVER_WORSE_AT if row in table.rows]
+    found = []
+    for reference in ((table, table.scratch), _best_start(studies)):
+        saved = [difference(reference, (table, row), "target_hours") for row in names]
+        p_values = holm([one.p_value for one in saved])
+        judged = zip(names, saved, p_values, strict=True)
+        costs = [row for row, one, p in judged if verdict(one, float(p)) == "costs"]
+        found.append(f"worse after {', '.join(costs)}" if costs else "yes")
+    return found
+
+
+def _said(what: str, best: list[Best]) -> str:
+    """Which ways beat the best optimistic start at their best, in words."""
+    beats = [one for one in best if one.verdict == "saves"]
+    if not beats:
+        return f"In {what} no way beats the best optimistic start."
+    ways = [
+        f"`{one.study}` after {int(one.row):,} episodes, by {spread(one.saved)} h" for one in beats
+    ]
+    return f"In {what} the best optimistic start is beaten by {listed(ways)}."
+
+
+def _cells(*best: Best) -> str:
+    """Cells of the table: the row, hours saved, p and verdict of each."""
+    return " | ".join(
+        f"after {one.row}: {spread(one.saved)} | {one.p_value:.2g} | {one.verdict}" for one in best
+    )
+
+
+def _best_start(studies: Studies) -> tuple[Evidence, str]:
+    optimistic = studies["optimistic"]
+    return optimistic, optimistic.best("target")
