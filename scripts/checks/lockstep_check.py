@@ -1,7 +1,7 @@
 """Check that a match of ROS nodes and the in-process trainer play the same, to the last bit.
 
-    .venv/bin/python scripts/lockstep_check.py --episodes 50
-    .venv/bin/python scripts/lockstep_check.py --task 4v3 --policies learn --single-process
+    .venv/bin/python scripts/checks/lockstep_check.py --episodes 50
+    .venv/bin/python scripts/checks/lockstep_check.py --task 4v3 --policies learn --single-process
 
 For each policy of the keepers a match is played in lock-step, every player its own process, and a
 trial by the trainer with the same seed. Every episode's cycles and outcome and all weights must be
