@@ -13,7 +13,8 @@ import pytest
 from scipy import stats
 
 from keepaway_transfer.reports.evidence import read_evidence
-from keepaway_transfer.reports.never_hurts import TABLES
+from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT, TABLES
+from keepaway_transfer.reports.overtraining import WAYS
 from keepaway_transfer.reports.page import page
 
 PACKAGE = Path(__file__).parents[3] / "src/keepaway_transfer"
@@ -152,6 +153,26 @@ def test_the_best_row_against_the_best_optimistic_start_comes_out_again_by_scipy
     line = re.search(rf"^\| `{name}` \| .*$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     assert line
     assert f"| {cells} | {p_values[best]:.2g} | {verdict} |" in line[0]
+
+
+def test_other_ways_to_carry_table2s_source_runs_come_out_again_by_scipy_as_pairs():
+    _, rho = hours_of("table2")
+    cells = [(name, row) for name in WAYS if name in STUDIES for row in NEVER_WORSE_AT]
+    found = []
+    for name, row in cells:
+        _, trials = hours_of(name)
+        both = pd.concat([rho.loc[row]["target"], trials.loc[row]["target"]], axis=1, join="inner")
+        test = stats.ttest_rel(both.iloc[:, 0], both.iloc[:, 1])
+        interval = test.confidence_interval()
+        saved = (both.iloc[:, 0] - both.iloc[:, 1]).mean()
+        found.append((saved, interval.low, interval.high, test.pvalue))
+    text = PAGE.read_text(encoding="utf-8")
+    p_values = holm_by_hand([one[3] for one in found])
+    for (name, row), (saved, low, high, _), p_value in zip(cells, found, p_values, strict=True):
+        judged = verdict_by_hand(saved, low, high, p_value)
+        ending = f"| {saved:.2f} [{low:.2f}, {high:.2f}] | {p_value:.2g} | {judged} |"
+        pattern = rf"^\| {re.escape(WAYS[name])} \| {row} \|.*{re.escape(ending)}$"
+        assert re.search(pattern, text, re.MULTILINE), f"{name} {row}: {ending}"
 
 
 def test_as_many_trials_as_the_page_says_resolve_two_hours_at_80_percent_power():

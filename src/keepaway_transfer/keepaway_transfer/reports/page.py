@@ -8,15 +8,14 @@ from keepaway_transfer.reports.evidence import (
     Evidence,
     Studies,
     beyond_optimism,
-    difference,
     scratch_difference,
 )
-from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT, never_hurts
+from keepaway_transfer.reports.never_hurts import never_hurts
+from keepaway_transfer.reports.overtraining import overtraining
 from keepaway_transfer.reports.page_elsewhere import PAPER, others, real_server
 from keepaway_transfer.reports.page_parts import (
     Lines,
     elsewhere,
-    listed,
     not_run,
     own_picture,
     said_of,
@@ -43,7 +42,7 @@ def page(studies: Studies) -> str:
         ["## What was seen here, row by row", "", *_rows(studies)],
         ["## What optimism explains", "", *_optimism(studies)],
         ["## What transfer adds beyond it", "", *_beyond(studies)],
-        ["## What too much training does, and why", "", *_overtraining(studies)],
+        ["## What too much training does, and why", "", *overtraining(studies)],
         ["## What the real server showed", "", *real_server(measured["real_server"])],
         ["## What others measured", "", *others(measured["others"])],
         ["## A transfer that never hurts", "", *never_hurts(studies)],
@@ -239,69 +238,6 @@ def _longer_at_first(jumpstart: Evidence, reference: str) -> Lines:
         f"| {row.name} | {row.trials} | {spread(found.jumpstart)} | {found.jumpstart_holm:.2g} |"
         for row in jumpstart.rows.values()
         if (found := row.against.get(reference)) is not None
-    ]
-
-
-def _overtraining(studies: Studies) -> Lines:
-    missing = [name for name in ("table2", "table2_at_5") if name not in studies]
-    lines = [
-        "An action's value is a sum over state variables, 13 in 3v2 and 19 in 4v3: copied weights"
-        " expect half as much again as 3v2 gave, and late 3v2 gives far more than 4v3 can. If"
-        " over-estimated values are the reason, the same weights at a lower level must be learned"
-        " from faster; if the skills are too special for 3v2, they must not.",
-        "",
-        *(not_run(*missing) if missing else _at_lower_level(studies)),
-    ]
-    if (variants := studies.get("variants_6000")) is not None:
-        lines += ["", *_lower_level(variants)]
-        for reference in variants.study.references:
-            lines += ["", f"`variants_6000`, against {reference}:", ""]
-            lines += study_table(variants, reference, "row")
-        lines += ["", shown_picture("Hours to 9.0 s", "variants_6000")]
-    return lines
-
-
-def _at_lower_level(studies: Studies) -> Lines:
-    """Rows of Table 2 beside the same source runs with every action worth 5 s on average."""
-    rho, at_5 = studies["table2"], studies["table2_at_5"]
-    names = [name for name in NEVER_WORSE_AT if name in rho.rows and name in at_5.rows]
-    saved = [difference((rho, name), (at_5, name), "target_hours") for name in names]
-    p_values = [float(p) for p in holm([one.p_value for one in saved])]
-    lines = [
-        "| episodes of 3v2 | level that rho carries (s) | 4v3 hours by rho | at a level of 5 s"
-        " | 4v3 hours saved by the level | p | |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for name, one, p_value in zip(names, saved, p_values, strict=True):
-        lines.append(
-            f"| {name} | {rho.rows[name].start_level:.1f} | {spread(rho.rows[name].target)}"
-            f" | {spread(at_5.rows[name].target)} | {spread(one)} | {p_value:.2g}"
-            f" | {verdict(one, p_value)} |"
-        )
-    judged = list(zip(names, saved, p_values, strict=True))
-    helped = [name for name, one, p_value in judged if verdict(one, p_value) == "saves"]
-    others = [name for name in names if name not in helped]
-    said = f"The level of 5 s saves hours after {listed(helped)} episodes" if helped else ""
-    if others:
-        said += ("; after" if said else "After") + f" {listed(others)} it saves none:"
-        said += " over-estimation is not what slows learning there"
-    picture = shown_picture("Hours to 9.0 s at a level of 5 s", "table2_at_5")
-    return [*lines, "", f"{said}.", "", picture]
-
-
-def _lower_level(one: Evidence) -> Lines:
-    """What the most trained row gives as rho carries it, and the best way to carry the same."""
-    most = max(row.source_episodes for row in one.study.rows)
-    names = [name for name in one.rows if one.row(name).source_episodes == most]
-    plain = next(name for name in names if one.row(name).variant == "rho")
-    best = min(names, key=lambda name: one.rows[name].target.estimate)
-    saved = difference((one, plain), (one, best), "target_hours")
-    gain = one.rows[best].against[one.scratch].target
-    return [
-        f"After {most:,} episodes 4v3 takes {spread(one.rows[plain].target)} h as rho carries them"
-        f" and {spread(one.rows[best].target)} h as `{one.row(best).variant}` does:"
-        f" {spread(saved)} h are saved by the way of carrying alone, and {spread(gain)} h against"
-        " scratch.",
     ]
 
 

@@ -1,0 +1,142 @@
+"""The section of the page on too much training: in which way the same weights help, and why."""
+
+from typing import NamedTuple
+
+from keepaway_transfer.reports.evidence import Evidence, Studies, difference
+from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT
+from keepaway_transfer.reports.page_parts import (
+    Lines,
+    listed,
+    not_run,
+    shown_picture,
+    study_table,
+)
+from keepaway_transfer.reports.report import spread
+from keepaway_transfer.reports.statistics import Comparison, holm
+from keepaway_transfer.reports.summary import verdict
+
+WAYS = {
+    "table2_at_5": "the level alone is set to 5 s",
+    "table2_rescaled": "all weights times 13/19",
+    "table2_scaled": "all weights multiplied to a level of 5 s",
+    "table2_averaged": "weights never learned take the mean of the others",
+}
+"""Studies that carry Table 2's source runs over in another way than rho."""
+SMALLER = ("table2_rescaled", "table2_scaled")
+"""Those that make everything smaller that much training left too large."""
+MUCH = ("6000", "9000")
+
+
+class Carried(NamedTuple):
+    """A row of Table 2 whose source runs were carried over in another way, too."""
+
+    study: str
+    row: str
+    saved: Comparison  # hours of 4v3 less than by rho
+    p_value: float  # adjusted over all rows and ways
+    verdict: str
+
+
+def overtraining(studies: Studies) -> Lines:
+    """The section's lines."""
+    missing = [name for name in ("table2", "table2_at_5") if name not in studies]
+    lines = [
+        "An action's value is a sum over state variables, 13 in 3v2 and 19 in 4v3: copied weights"
+        " expect half as much again as 3v2 gave, and late 3v2 gives far more than 4v3 can. If"
+        " over-estimated values are the reason, the same weights at a lower level must be learned"
+        " from faster. If it is what differs between states and actions, it helps to make all"
+        " weights smaller. If the skills are too special for 3v2, neither helps.",
+        "",
+        *(not_run(*missing) if missing else by_other_ways(studies)),
+    ]
+    if (variants := studies.get("variants_6000")) is not None:
+        lines += ["", *_best_way(variants)]
+        for reference in variants.study.references:
+            lines += ["", f"`variants_6000`, against {reference}:", ""]
+            lines += study_table(variants, reference, "row")
+        lines += ["", shown_picture("Hours to 9.0 s", "variants_6000")]
+    return lines
+
+
+def by_other_ways(studies: Studies) -> Lines:
+    """Rows of Table 2 beside the same source runs carried over in other ways."""
+    rho, found = studies["table2"], carried(studies)
+    lines = [
+        "| way | episodes of 3v2 | level that rho carries (s) | 4v3 hours by rho | so carried"
+        " | 4v3 hours saved | p | |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in found:
+        before, after = rho.rows[one.row], studies[one.study].rows[one.row]
+        lines.append(
+            f"| {WAYS[one.study]} | {one.row} | {before.start_level:.1f} | {spread(before.target)}"
+            f" | {spread(after.target)} | {spread(one.saved)} | {one.p_value:.2g} | {one.verdict} |"
+        )
+    ways = list(dict.fromkeys(one.study for one in found))
+    lines += ["", *(_said(name, [one for one in found if one.study == name]) for name in ways)]
+    if (why := _why(found)) is not None:
+        lines.append(why)
+    for name in ways:
+        lines += ["", shown_picture(f"Hours to 9.0 s: {WAYS[name]}", name)]
+    return lines
+
+
+def carried(studies: Studies) -> list[Carried]:
+    """What every other way saves against rho, as pairs."""
+    rho = studies["table2"]
+    cells = [
+        (name, row, difference((rho, row), (studies[name], row), "target_hours"))
+        for name in WAYS
+        if name in studies
+        for row in NEVER_WORSE_AT
+        if row in rho.rows and row in studies[name].rows
+    ]
+    p_values = [float(p) for p in holm([saved.p_value for _, _, saved in cells])]
+    return [
+        Carried(*cell, p_value, verdict(cell[2], p_value))
+        for cell, p_value in zip(cells, p_values, strict=True)
+    ]
+
+
+def _said(name: str, found: list[Carried]) -> str:
+    """After how many episodes a way saves hours, in words."""
+    helped = [one.row for one in found if one.verdict == "saves"]
+    others = [one.row for one in found if one.verdict != "saves"]
+    what = f"{WAYS[name][0].upper()}{WAYS[name][1:]} (`{name}`):"
+    if not others:
+        return f"{what} this saves hours after {listed(helped)} episodes."
+    if not helped:
+        return f"{what} this saves none."
+    return f"{what} this saves hours after {listed(helped)} episodes, none after {listed(others)}."
+
+
+def _why(found: list[Carried]) -> str | None:
+    """What slows learning after much 3v2, where the ways tell."""
+    saves = {(one.study, one.row): one.verdict == "saves" for one in found}
+    if not all(("table2_at_5", row) in saves for row in MUCH):
+        return None
+    if any(saves["table2_at_5", row] for row in MUCH):
+        return "So after much 3v2 over-estimation slows learning."
+    smaller = [name for name in SMALLER if all(saves.get((name, row), False) for row in MUCH)]
+    if smaller:
+        return (
+            "So it is not over-estimation alone that slows learning after much 3v2: to lower every"
+            " value by the same does not help there, to make all weights smaller does."
+        )
+    return "So over-estimation is not what slows learning after much 3v2."
+
+
+def _best_way(one: Evidence) -> Lines:
+    """What the most trained row gives as rho carries it, and the best way to carry the same."""
+    most = max(row.source_episodes for row in one.study.rows)
+    names = [name for name in one.rows if one.row(name).source_episodes == most]
+    plain = next(name for name in names if one.row(name).variant == "rho")
+    best = min(names, key=lambda name: one.rows[name].target.estimate)
+    saved = difference((one, plain), (one, best), "target_hours")
+    gain = one.rows[best].against[one.scratch].target
+    return [
+        f"After {most:,} episodes 4v3 takes {spread(one.rows[plain].target)} h as rho carries them"
+        f" and {spread(one.rows[best].target)} h as `{one.row(best).variant}` does:"
+        f" {spread(saved)} h are saved by the way of carrying alone, and {spread(gain)} h against"
+        " scratch.",
+    ]
