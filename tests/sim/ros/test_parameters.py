@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.errors import SettingError
-from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
 from keepaway_sim.settings import setting
 
 MakeNode = Callable[[dict[str, Any]], Node]
@@ -154,3 +154,28 @@ def test_changes_that_are_refused_change_nothing(
     assert reason in done.reason
     assert seen == []
     assert node.get_parameter(name).value == getattr(Wish(), name)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("profle", "nothing reads the parameter profle: did you mean profile?"),
+        ("xyzzy", "nothing reads the parameter xyzzy: --help lists those that there are"),
+    ],
+)
+def test_a_parameter_that_nothing_reads_is_warned_of(
+    make_node: MakeNode, capfd: pytest.CaptureFixture[str], given: str, said: str
+) -> None:
+    node = make_node({given: 1})
+    declare_settings(node, Wish)
+    warn_of_unknown(node, (Wish,))
+    assert said in capfd.readouterr().err
+
+
+def test_parameters_that_are_read_are_not_warned_of(
+    make_node: MakeNode, capfd: pytest.CaptureFixture[str]
+) -> None:
+    node = make_node({"pace": 2.0, "count": 4, "use_sim_time": False})
+    declare_settings(node, Wish)
+    warn_of_unknown(node, (Wish,))
+    assert "nothing reads" not in capfd.readouterr().err

@@ -10,6 +10,7 @@ test holds the two together.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Collection
 from numbers import Real
 from typing import Any, TypeVar
@@ -67,6 +68,23 @@ def declare_settings(
     if changeable:
         _Follower(node, made, on_change or (lambda _: None))
     return made
+
+
+def warn_of_unknown(node: Node, settings: Collection[type]) -> None:
+    """Warn of parameters that were given and that no node reads: ROS itself says nothing.
+
+    Args:
+        node: with all its parameters declared.
+        settings: the classes of those.
+    """
+    declared = [each for group in settings for each in settings_of(group).values()]
+    known = {name for each in declared for name in (each.name, *each.was)}
+    for name in node._parameter_overrides:  # rclpy shows them in no other way
+        if name in known or node.has_parameter(name):
+            continue
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {near[0]}?" if near else "--help lists those that there are"
+        node.get_logger().warning(f"nothing reads the parameter {name}: {hint}")
 
 
 def descriptor(declared: Setting, read_only: bool = True) -> ParameterDescriptor:

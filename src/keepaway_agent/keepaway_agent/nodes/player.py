@@ -21,7 +21,7 @@ from keepaway_agent.errors import AgentError, WeightsError
 from keepaway_agent.files import path_within
 from keepaway_agent.learning.weights import LearnedWeights, load_weights, save_weights
 from keepaway_agent.nodes import conversions
-from keepaway_agent.nodes.parameters import declare_settings
+from keepaway_agent.nodes.parameters import declare_settings, warn_of_unknown
 from keepaway_agent.nodes.qos import ANSWERS, MATCHES_KEPT, PERCEPTIONS, STATUSES
 from keepaway_agent.nodes.running import run_node
 from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, WeightsFiles, check_config
@@ -46,6 +46,10 @@ class PlayerSettings:
     weights_dir: str = setting(
         ".", "folder in which its services may read and write weights, and nowhere else"
     )
+
+
+SETTINGS = (AgentConfig, WeightsFiles, PlayerSettings)
+"""All of a player's parameters."""
 
 
 class PlayerNode(Node):
@@ -73,6 +77,7 @@ class PlayerNode(Node):
         check_config(role, self._config)
         files = declare_settings(self, WeightsFiles)
         self._settings = declare_settings(self, PlayerSettings)
+        warn_of_unknown(self, SETTINGS)
         self._save_every = files.save_every
         self._weights_path = Path(files.save_weights).absolute() if files.save_weights else None
         self._start_weights = self._weights_to_start_from(files)
@@ -267,8 +272,7 @@ def main(role: Role, args: list[str] | None = None) -> None:
     Raises:
         SystemExit: it cannot play.
     """
-    settings = (AgentConfig, WeightsFiles, PlayerSettings)
-    run_node(role.name.lower(), partial(_play, role), settings, AgentError, args)
+    run_node(role.name.lower(), partial(_play, role), SETTINGS, AgentError, args)
 
 
 def _play(role: Role, must_end: Callable[[], bool]) -> None:

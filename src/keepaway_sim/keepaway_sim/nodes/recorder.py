@@ -31,7 +31,7 @@ from keepaway_sim.bags.timeline import OwnTimes
 from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
-from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
 from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.ros.subscribing import listen, offered_qos, take_all, to_profile
 from keepaway_sim.settings import flat, setting
@@ -115,6 +115,7 @@ class Recorder(Node):
         """
         super().__init__("recorder", **node_options)
         self.settings = declare_settings(self, RecorderSettings)
+        warn_of_unknown(self, (RecorderSettings,))
         self.gaps = GapCounter()
         self._subscriptions_by_topic: dict[str, tuple[str, Subscription]] = {}
         self._times = OwnTimes()

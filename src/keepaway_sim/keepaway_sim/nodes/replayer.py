@@ -31,7 +31,7 @@ from keepaway_sim.bags.timeline import Timeline
 from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.cli.interrupts import SIGNALS, Stopped
 from keepaway_sim.errors import KeepawayError, one_line
-from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
 from keepaway_sim.ros.running import check_arguments
 from keepaway_sim.ros.subscribing import check_topic_name, message_class, to_profile
 from keepaway_sim.settings import setting
@@ -114,6 +114,7 @@ class Replayer(Node):
         """
         super().__init__("replayer", **node_options)
         self.settings = declare_settings(self, ReplayerSettings, ("rate",), self._on_settings)
+        warn_of_unknown(self, (ReplayerSettings,))
         timeline = Timeline.of_bag(BagReader(self.settings.path), self.settings.match)
         topics = self._playable(timeline)
         self.playback = Playback(

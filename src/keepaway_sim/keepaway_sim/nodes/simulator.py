@@ -27,7 +27,7 @@ from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.match.conductor import FAREWELL, Conductor, Spin
 from keepaway_sim.match.settings import CHANGEABLE, MatchSettings, read_named_texts
 from keepaway_sim.ros.diagnostics import Troubles, diagnostics, simulator_status
-from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
 from keepaway_sim.ros.publishing import ALL, LATCHED, MATCHES, QUEUE, MatchPublisher
 from keepaway_sim.ros.raw_subscription import PROCESS_SIZE, RawSubscription
 from keepaway_sim.ros.running import run_node
@@ -68,6 +68,7 @@ class Simulator(Node):
         settings = declare_settings(self, MatchSettings, CHANGEABLE, self._on_settings)
         task = Task.parse(settings.task, settings.field)
         world = World(task, self._declare_config())
+        warn_of_unknown(self, (MatchSettings, Config))
         self._bag = self._open_bag(world, settings)
         self._publisher = MatchPublisher(self, task.player_names, self._bag)
         self.conductor = Conductor(world, settings, self._publisher, self.get_logger())

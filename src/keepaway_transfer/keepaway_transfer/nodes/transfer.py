@@ -20,7 +20,7 @@ from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_agent.texts import one_line
 from keepaway_msgs.srv import ApplyRho
 from keepaway_sim.errors import KeepawayError
-from keepaway_sim.ros.parameters import declare_settings
+from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
 from keepaway_sim.ros.running import run_node
 from keepaway_sim.settings import setting
 from keepaway_transfer.mapping import load_mapping
@@ -45,6 +45,7 @@ class TransferNode(Node):
         """Offer the service; `node_options` are for `rclpy.node.Node`."""
         super().__init__("transfer", **node_options)
         self._folder = Path(declare_settings(self, TransferSettings).weights_dir)
+        warn_of_unknown(self, (TransferSettings,))
         self.create_service(ApplyRho, f"{self.get_name()}/apply", self._on_apply)
 
     def _on_apply(
