@@ -32,6 +32,7 @@ from keepaway_agent.learning.weights import load_weights, save_weights
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import Progress, StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.cli.interrupts import Interruption, Stopped
+from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
@@ -199,8 +200,8 @@ def transfer_by_node(source: Path, target: Path) -> str:
     from keepaway_msgs.srv import ApplyRho
 
     source, target = source.resolve(), target.resolve()
-    folder = f"weights_dir:={json.dumps(str(target.parent))}"
-    command = [sys.executable, str(SCRIPTS / "transfer.py"), "node", "--ros-args", "-p", folder]
+    settings = ros_arguments({"weights_dir": str(target.parent)})
+    command = [sys.executable, str(SCRIPTS / "transfer.py"), "node", *settings]
     with subprocess.Popen(command) as process:
         rclpy.init()
         node = rclpy.create_node("demo")
