@@ -48,7 +48,14 @@ def test_the_optimistic_study_learns_from_no_source():
 
 
 @pytest.mark.parametrize(
-    "name", ["table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled"]
+    "name",
+    [
+        "table2_averaged",
+        "table2_rescaled",
+        "table2_at_5",
+        "table2_scaled",
+        "table2_averaged_scaled",
+    ],
 )
 def test_tables_of_other_ways_have_the_sources_of_table2(name):
     table2, other = load_study("table2"), load_study(name)

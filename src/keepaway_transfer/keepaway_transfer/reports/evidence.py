@@ -92,22 +92,24 @@ def difference(
     )
 
 
-def beyond_optimism(studies: Studies) -> dict[str, tuple[Comparison, Comparison, Comparison]]:
-    """Every row of Table 2 with a source against the best optimistic start by target hours.
+def beyond_optimism(
+    studies: Studies, study: str = "table2"
+) -> dict[str, tuple[Comparison, Comparison, Comparison]]:
+    """Every row of a study with a source against the best optimistic start by target hours.
 
     Returns:
         by row: target hours saved, total hours saved, seconds held longer at first.
     """
-    table2, optimistic = studies["table2"], studies["optimistic"]
+    table, optimistic = studies[study], studies["optimistic"]
     best = optimistic, optimistic.best("target")
     return {
         name: (
-            difference(best, (table2, name), "target_hours"),
-            difference(best, (table2, name), "total_hours"),
-            difference((table2, name), best, "initial_performance"),
+            difference(best, (table, name), "target_hours"),
+            difference(best, (table, name), "total_hours"),
+            difference((table, name), best, "initial_performance"),
         )
-        for name in table2.rows
-        if name != table2.scratch
+        for name in table.rows
+        if name != table.scratch
     }
 
 

@@ -12,7 +12,14 @@ from keepaway_transfer.reports.report import spread
 from keepaway_transfer.reports.statistics import Comparison, holm
 from keepaway_transfer.reports.summary import verdict
 
-TABLES = ("table2", "table2_averaged", "table2_rescaled", "table2_at_5", "table2_scaled")
+TABLES = (
+    "table2",
+    "table2_averaged",
+    "table2_rescaled",
+    "table2_at_5",
+    "table2_scaled",
+    "table2_averaged_scaled",
+)
 NEVER_WORSE_AT = ("1000", "3000", "6000", "9000")
 
 
@@ -59,6 +66,16 @@ def never_hurts(studies: Studies) -> Lines:
             lines += ["", f"`{name}` against scratch:", ""]
             lines += study_table(table, table.scratch, "episodes of 3v2")
     return lines
+
+
+def best_way(studies: Studies) -> str:
+    """The study of those with the least hours of 4v3 at its best row."""
+    hours = {
+        name: min(row.target.estimate for row in studies[name].rows.values())
+        for name in TABLES
+        if name in studies
+    }
+    return min(hours, key=hours.__getitem__)
 
 
 def best_row(studies: Studies, name: str, measure: str) -> Best:

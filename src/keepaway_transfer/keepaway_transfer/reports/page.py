@@ -10,7 +10,7 @@ from keepaway_transfer.reports.evidence import (
     beyond_optimism,
     scratch_difference,
 )
-from keepaway_transfer.reports.never_hurts import never_hurts
+from keepaway_transfer.reports.never_hurts import best_way, never_hurts
 from keepaway_transfer.reports.overtraining import overtraining
 from keepaway_transfer.reports.page_elsewhere import PAPER, others, real_server
 from keepaway_transfer.reports.page_parts import (
@@ -189,17 +189,31 @@ def _beyond(studies: Studies) -> Lines:
 
 
 def _beyond_table(studies: Studies) -> Lines:
-    found = beyond_optimism(studies)
-    adjusted = [holm([three[k].p_value for three in found.values()]) for k in range(3)]
-    best = studies["optimistic"].best("target")
     transfer = studies["table2"].best("total")
-    _, of_total, at_first = found[transfer]
+    _, of_total, at_first = beyond_optimism(studies)[transfer]
+    title = "What transfer saves against an optimistic start"
     lines = [
         f"The row of Table 2 with the least hours in all is {transfer}: against the best optimistic"
         f" start it saves {spread(of_total)} h in all, and its keepers hold the ball for"
         f" {spread(at_first)} s longer at first. (Both were chosen as the best on these trials.)",
         "",
-        f"Every row of Table 2 against the best optimistic start, {best}:",
+        *_against_optimism(studies, "table2"),
+        "",
+        own_picture(title, "beyond_optimism"),
+    ]
+    if (best := best_way(studies)) != "table2":
+        lines += ["", f"The way of carrying with the least hours of 4v3 is that of `{best}`.", ""]
+        lines += _against_optimism(studies, best)
+    return lines
+
+
+def _against_optimism(studies: Studies, study: str) -> Lines:
+    """Every row of a study against the best optimistic start."""
+    found = beyond_optimism(studies, study)
+    adjusted = [holm([three[k].p_value for three in found.values()]) for k in range(3)]
+    lines = [
+        f"Every row of `{study}` against the best optimistic start,"
+        f" {studies['optimistic'].best('target')}:",
         "",
         "| episodes of 3v2 | 4v3 hours saved | p | | total hours saved | p | | longer at first (s)"
         " | p |",
@@ -212,8 +226,7 @@ def _beyond_table(studies: Studies) -> Lines:
             f" | {spread(total)} | {p_total:.2g} | {verdict(total, p_total)}"
             f" | {spread(start)} | {p_start:.2g} |"
         )
-    title = "What transfer saves against an optimistic start"
-    return [*lines, "", own_picture(title, "beyond_optimism")]
+    return lines
 
 
 def _jumpstart(jumpstart: Evidence) -> Lines:
