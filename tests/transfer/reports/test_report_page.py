@@ -90,6 +90,7 @@ def test_a_way_that_never_hurts_is_told_from_one_that_does(studies):
     assert lines["`table2_at_5`"].count("| yes | yes | after 1000: 6.00 [") == 1
     assert lines["`table2_at_5`"].count("| saves | after 1000: 4.00 [") == 1
     assert "In 4v3 hours the best optimistic start is beaten by `table2_at_5`" in page(studies)
+    assert "than from scratch or from the best optimistic start: `table2_at_5`." in page(studies)
 
 
 def test_the_page_says_what_the_best_row_adds_to_the_best_optimistic_start(studies):

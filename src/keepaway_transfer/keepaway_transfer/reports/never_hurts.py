@@ -48,7 +48,9 @@ def never_hurts(studies: Studies) -> Lines:
         measure: [best_row(studies, name, measure) for name in tables]
         for measure in ("target", "total")
     }
+    hurts = {name: _worse(studies, name) for name in tables}
     lines = [
+        _said_of_all(hurts),
         _said("4v3 hours", best["target"]),
         _said("hours in all", best["total"]),
         "The best row of each study was chosen on these trials; p is adjusted over all its rows.",
@@ -59,8 +61,7 @@ def never_hurts(studies: Studies) -> Lines:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, target, total in zip(tables, best["target"], best["total"], strict=True):
-        hurts = " | ".join(_worse(studies, name))
-        lines.append(f"| `{name}` | {hurts} | {_cells(target, total)} |")
+        lines.append(f"| `{name}` | {' | '.join(hurts[name])} | {_cells(target, total)} |")
     for name in tables:
         if (table := studies[name]) is not studies["table2"]:
             lines += ["", f"`{name}` against scratch:", ""]
@@ -100,6 +101,16 @@ def _worse(studies: Studies, name: str) -> list[str]:
         costs = [row for row, one, p in judged if verdict(one, float(p)) == "costs"]
         found.append(f"worse after {', '.join(costs)}" if costs else "yes")
     return found
+
+
+def _said_of_all(hurts: dict[str, list[str]]) -> str:
+    """Which ways are nowhere worse, in words."""
+    safe = [f"`{name}`" for name, found in hurts.items() if found == ["yes", "yes"]]
+    after = f"after {listed([f'{int(row):,}' for row in NEVER_WORSE_AT])} episodes"
+    start = "from scratch or from the best optimistic start"
+    if not safe:
+        return f"Every way is somewhere worse {after}, in 4v3 hours, than {start}."
+    return f"Nowhere worse {after}, in 4v3 hours, than {start}: {listed(safe)}."
 
 
 def _said(what: str, best: list[Best]) -> str:

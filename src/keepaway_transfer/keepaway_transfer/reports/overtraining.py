@@ -20,7 +20,7 @@ WAYS = {
     "table2_rescaled": "all weights times 13/19",
     "table2_scaled": "all weights multiplied to a level of 5 s",
     "table2_averaged": "weights never learned take the mean of the others",
-    "table2_averaged_scaled": "so averaged, then all multiplied to a level of 5 s",
+    "table2_averaged_scaled": "averaged and then multiplied to a level of 5 s",
 }
 """Studies that carry Table 2's source runs over in another way than rho."""
 SMALLER = ("table2_rescaled", "table2_scaled", "table2_averaged_scaled")
