@@ -50,8 +50,8 @@ class Outlet(Protocol):
     def has_subscribers(self, topic: str) -> bool:
         """Whether anything subscribes to it."""
 
-    def wait_until_received(self, topic: str, patience: float) -> None:
-        """Wait until all subscribers have what was published, at most `patience` seconds."""
+    def wait_until_received(self, patience: float) -> None:
+        """Wait until all subscribers have all that was published, at most `patience` seconds."""
 
     def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
         """Record what another node published, if a bag is written."""
@@ -153,7 +153,7 @@ class Conductor:
         while self._clock() < until and (not self._is_taken_in() or self.recorder_lag):
             self._spin(RESEND_PERIOD)
         self._record_statuses()
-        self._outlet.wait_until_received("episode", FAREWELL)
+        self._outlet.wait_until_received(FAREWELL)
         self.on_end()
 
     # What others send and ask for.

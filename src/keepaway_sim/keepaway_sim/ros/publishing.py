@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import monotonic
 
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -75,9 +76,14 @@ class MatchPublisher:
         """Whether anything subscribes to it."""
         return bool(self._publishers[topic].get_subscription_count())
 
-    def wait_until_received(self, topic: str, patience: float) -> None:
-        """Wait until all subscribers have what was published, at most `patience` seconds."""
-        self._publishers[topic].wait_for_all_acked(Duration(seconds=patience))
+    def wait_until_received(self, patience: float) -> None:
+        """Wait until all subscribers have all that was published, at most `patience` seconds.
+
+        What a process has published and not sent yet is lost with it.
+        """
+        until = monotonic() + patience
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - monotonic())))
 
     def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
         """Record what another node published, if a bag is written; `topic` is relative."""
