@@ -72,12 +72,12 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
         with tqdm(
             total=progress.trials, initial=progress.done, disable=None, bar_format=BAR
         ) as bar:
-            for trial in run(
+            for trials in run(
                 study, results, executor, play_batch, arguments.batch, interruption.shield
             ):
-                progress.add(trial)
+                progress.add(trials)
                 bar.set_description_str(str(progress), refresh=False)
-                bar.update()
+                bar.update(len(trials))
                 if bar.disable:  # the output is no terminal
                     log.info("%s", progress)
     pack(arguments.out)
@@ -112,7 +112,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--trials", type=int, help="trials a row; default the study's")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--scheduler", help="address of a Dask scheduler, instead of processes")
-    parser.add_argument("--batch", type=int, default=25, help="trials played together")
+    parser.add_argument("--batch", type=int, default=50, help="trials played together")
     parser.add_argument("--resume", action="store_true", help="continue with existing results")
     parser.add_argument("--any-code", action="store_true", help="also if the code has changed")
     return parser.parse_args()

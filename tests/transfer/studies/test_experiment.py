@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from keepaway_transfer.studies.experiment import StudyProgress, plan, run
 from keepaway_transfer.studies.results import StudyTrial, open_results, read_trials
-from keepaway_transfer.studies.study import load_study
+from keepaway_transfer.studies.study import Row, load_study
 
 TINY = load_study("tiny")
 KEYS = [(row.name, number) for row in TINY.rows for number in range(TINY.trials)]
@@ -40,7 +40,7 @@ def run_all(folder, play, resume=False, study=TINY, batch=3):
         ThreadPoolExecutor(1) as executor,
         open_results(folder, study, command="x", code_version="v1", resume=resume) as results,
     ):
-        return list(run(study, results, executor, play, batch))
+        return [trial for trials in run(study, results, executor, play, batch) for trial in trials]
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -55,6 +55,14 @@ def test_every_trial_that_is_left_is_planned_once(shared, done, batch):
 def test_rows_that_share_their_sources_are_played_together():
     study = attrs.evolve(TINY, shared_sources=True)
     assert plan(study, set(), batch=3)[0] == (("0", 0), ("4", 0), ("8", 0))
+
+
+def test_rows_far_apart_take_turns():
+    wide = attrs.evolve(
+        TINY, trials=2, references=("0",), rows=tuple(Row(name) for name in "0123456789")
+    )
+    order = [keys[0][0] for keys in plan(wide, set(), batch=1)]
+    assert order == 2 * list("0741852963")
 
 
 def test_a_run_yields_and_writes_every_trial(tmp_path):
@@ -107,8 +115,7 @@ def test_progress_knows_the_time_left_by_the_work_that_was_done():
     now = 100.0
     progress = StudyProgress(TINY, done=KEYS[:4], clock=lambda: now)
     assert str(progress) == "4/12 trials, time left unknown"
-    for trial in play(TINY, KEYS[4:8]):  # half of what is left, bar four episodes of 12,000
-        progress.add(trial)
+    progress.add(play(TINY, KEYS[4:8]))  # half of what is left, bar four episodes of 12,000
     now = 160.0
     assert progress.seconds_left == pytest.approx(60, rel=0.01)
     assert str(progress) == "8/12 trials, time left 1 min"

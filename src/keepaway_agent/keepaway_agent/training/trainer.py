@@ -107,12 +107,13 @@ class Trainer:
                 self._start_next(number, waiting)
             for cycle in itertools.count(1):
                 self._decide(self._everywhere)
-                for number in self._fields_at_an_end():
+                ended = self._fields_at_an_end()
+                for number in ended:
                     if result := self._end_episode(number):
                         self._start_next(number, waiting)
                         self._decide(np.arange(len(fields)) == number)
                         yield result
-                if not self._world.truth.running.any():
+                if (ended or cycle == 1) and not self._world.truth.running.any():
                     return
                 if watch_cycle:
                     watch_cycle(self._world)
@@ -150,7 +151,7 @@ class Trainer:
         """Fields whose episode is over, or whose trial has used up its cycles."""
         belief = self._world.belief
         over = (belief.outcome != _IN_PLAY) | (belief.cycle >= self._cycles_left)
-        ended: list[int] = np.flatnonzero(over & self._world.truth.running).tolist()
+        ended: list[int] = (over & self._world.truth.running).nonzero()[0].tolist()
         return ended
 
     def _end_episode(self, number: int) -> TrialResult | None:

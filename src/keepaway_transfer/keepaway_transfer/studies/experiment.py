@@ -5,6 +5,7 @@ processes on this machine, or a cluster's through its own executor (Dask's `Clie
 A trial gives the same whatever batch it is in, so a run can be stopped and resumed anywhere.
 """
 
+import math
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -16,6 +17,7 @@ from keepaway_transfer.studies.study import Study
 Key = tuple[str, int]  # a row's name and a trial's number
 PlayBatch = Callable[[Study, Sequence[Key]], list[StudyTrial]]
 
+GOLDEN_SECTION = (math.sqrt(5.0) - 1.0) / 2.0
 TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
 
 
@@ -24,10 +26,12 @@ def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...
 
     Rows that share their trials' source runs stay together, so that those are played once. All
     rows get on at the same pace: a study that is stopped early has about as many trials of each.
+    Rows far apart in the study take turns, so that its first batches are a fair sample of it: the
+    time left is estimated from them.
 
     >>> from keepaway_transfer.studies.study import load_study
     >>> plan(load_study("tiny"), done={("0", 1)}, batch=4)[:2]
-    [(('0', 0), ('0', 2), ('0', 3)), (('4', 0), ('4', 1), ('4', 2), ('4', 3))]
+    [(('0', 0), ('0', 2), ('0', 3)), (('8', 0), ('8', 1), ('8', 2), ('8', 3))]
     """
     names = [row.name for row in study.rows]
     numbers = range(study.trials)
@@ -41,7 +45,7 @@ def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...
         groups = [
             [(name, number) for number in some]
             for some in _chunks(numbers, batch)
-            for name in names
+            for name in _far_apart(names)
         ]
     left = [tuple(key for key in group if key not in done) for group in groups]
     return [group for group in left if group]
@@ -54,8 +58,8 @@ def run(
     play: PlayBatch,
     batch: int,
     shield: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> Iterator[StudyTrial]:
-    """PlayBatch the trials that are left and yield each once it is on the disk.
+) -> Iterator[list[StudyTrial]]:
+    """Play the trials that are left, and yield those of each batch once they are on the disk.
 
     Stopping the iteration gives up the batches that were not begun. A batch that has been played is
     written in a `shield`, that lets a signal wait.
@@ -72,7 +76,7 @@ def run(
                 with shield():
                     for trial in trials:
                         results.append(trial)
-                yield from trials
+                yield trials
     finally:
         for future in pending:
             future.cancel()
@@ -101,10 +105,10 @@ class StudyProgress:
         self._played = 0
         self._clock, self._start = clock, clock()
 
-    def add(self, trial: StudyTrial) -> None:
-        """Count a trial that was played."""
-        weight = self._weights[trial.row]
-        self.done += 1
+    def add(self, trials: Sequence[StudyTrial]) -> None:
+        """Count trials that were played, a batch's at once: they come to their end together."""
+        weight = sum(self._weights[trial.row] for trial in trials)
+        self.done += len(trials)
         self._left -= weight
         self._played += weight
 
@@ -119,6 +123,18 @@ class StudyProgress:
         minutes = self.seconds_left / 60
         left = "unknown" if minutes == float("inf") else f"{minutes:.0f} min"
         return f"{self.done}/{self.trials} trials, time left {left}"
+
+
+def _far_apart(names: Sequence[str]) -> list[str]:
+    """The names in steps of the golden section of their number, round and round.
+
+    >>> "".join(_far_apart("0123456789"))
+    '0741852963'
+    """
+    num = len(names)
+    coprime = [step for step in range(1, num + 1) if math.gcd(step, num) == 1]
+    step = min(coprime, key=lambda step: abs(step - GOLDEN_SECTION * num))
+    return [names[step * k % num] for k in range(num)]
 
 
 def _chunks(numbers: range, size: int) -> list[range]:
