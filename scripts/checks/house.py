@@ -38,6 +38,7 @@ TWINS = (
     "running.py",
     "settings.py",
     "trigonometry.py",
+    "version.py",
 )
 """Files that two packages have on purpose, equal but for the package's name."""
 TWIN_NAMES = {

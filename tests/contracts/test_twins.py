@@ -27,6 +27,7 @@ TWINS = {
     "world/machine_code.py": "machine_code.py",
     "world/passing.py": "passing.py",
     "world/trigonometry.py": "trigonometry.py",
+    "version.py": "version.py",
 }
 
 

@@ -8,7 +8,6 @@ perception comes, and answers perceptions.
 import gc
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from keepaway_agent.nodes.qos import ANSWERS, MATCHES_KEPT, PERCEPTIONS, STATUSE
 from keepaway_agent.nodes.running import run_node
 from keepaway_agent.playing.agent import Agent, AgentConfig, Perceived, WeightsFiles, check_config
 from keepaway_agent.settings import setting
+from keepaway_agent.version import code_version
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 
@@ -180,7 +180,7 @@ class PlayerNode(Node):
                 ready=agent is not None,
                 episodes=agent.episodes if agent else 0,
                 simulated_hours=agent.hours if agent else 0.0,
-                code_version=version("keepaway_agent"),
+                code_version=code_version(),
                 match_id=self._match_id,
             )
         )
