@@ -94,7 +94,7 @@ def times_by_amount(
         )  # fmt: skip
     axes.set_xticks(places, rows)
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False)
+    axes.legend(edgecolor="none")
     return figure
 
 
@@ -153,7 +153,7 @@ def share_reached(curves: Mapping[str, SurvivalCurve], limit: float, title: str)
         limit = min(limit, 1.05 * max(curve.times[-1] for curve in curves.values()))
     axes.set_xlim(0, limit)
     axes.set_ylim(0, 1.02)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    figure.legend(frameon=False, fontsize=8, loc="outside right upper")
     return figure
 
 
@@ -209,7 +209,7 @@ def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> 
             )  # fmt: skip
     axes.set_xlim(left=0)
     axes.set_ylim(0, 1.02)
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="upper right")  # where durations leave room
     return figure
 
 
