@@ -197,6 +197,19 @@ def test_senders_are_known_by_the_graphs_own_identities(graph: Graph) -> None:
     subscription.destroy()
 
 
+def test_a_match_ends_when_ros_is_shut_down(ros_domain: int) -> None:
+    context = Context()
+    context.init(domain_id=ros_domain)
+    spins: list[float] = []
+
+    def spin(timeout: float) -> None:
+        spins.append(timeout)
+        context.try_shutdown()
+
+    Simulator(context=context).play(spin)
+    assert len(spins) == 1
+
+
 def test_it_pauses_starts_and_resets_on_demand(graph: Graph) -> None:
     simulator = graph.start_simulator(autostart=False, answer_timeout=SLOW_ENOUGH)
     graph.start_players()

@@ -65,6 +65,8 @@ class Simulator(Node):
             KeepawayError: parameters that make no match.
         """
         super().__init__("simulator", **node_options)
+        self._is_shut_down = False  # noted: to ask ROS takes a microsecond, many times a cycle
+        self.context.on_shutdown(self._on_shutdown)
         settings = declare_settings(self, MatchSettings, CHANGEABLE, self._on_settings)
         task = Task.parse(settings.task, settings.field)
         world = World(task, self._declare_config())
@@ -83,9 +85,12 @@ class Simulator(Node):
 
     def play(self, spin: Spin, must_end: Callable[[], bool] = lambda: False) -> None:
         """Play until all episodes have ended, or a signal comes, or ROS is shut down."""
-        self.conductor.play(spin, lambda: must_end() or not self.context.ok())
+        self.conductor.play(spin, lambda: self._is_shut_down or must_end())
         if self.context.ok():
             self.conductor.take_leave()
+
+    def _on_shutdown(self) -> None:
+        self._is_shut_down = True
 
     def destroy_node(self) -> None:
         """Leave the graph."""
