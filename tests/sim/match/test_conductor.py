@@ -47,6 +47,7 @@ class Stage:
         self.recorded: list[str] = []
         self.reports: list[str] = []
         self.warnings: list[str] = []
+        self.waited_for: list[int] = []  # how much had been published at each wait
         self.silent: set[int] = set()
         self.is_lost: Lossy = lambda topic, saying: False
         self.hook: Callable[[], None] = lambda: None
@@ -77,7 +78,7 @@ class Stage:
         return True
 
     def wait_until_received(self, patience: float) -> None:
-        pass
+        self.waited_for.append(len(self.published))
 
     def record_answer(self, topic: str, message_type: str, data: bytes, time: int) -> None:
         self.recorded.append(topic)
@@ -292,6 +293,7 @@ def test_players_may_take_in_the_end_before_the_simulator_leaves() -> None:
     stage.match.take_leave()
     assert len(ended) == 1
     assert stage.now - then < 1.0
+    assert stage.waited_for == [len(stage.published)]  # everybody has all of it before it leaves
     assert stage.recorded[-1] == "taker_2/status"
 
 
