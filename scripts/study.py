@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import attrs
 from tqdm import tqdm
@@ -72,17 +73,23 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
         with tqdm(
             total=progress.trials, initial=progress.done, disable=None, bar_format=BAR
         ) as bar:
+            _show(progress, bar)
             for trials in run(
                 study, results, executor, play_batch, arguments.batch, interruption.shield
             ):
                 progress.add(trials)
-                bar.set_description_str(str(progress), refresh=False)
                 bar.update(len(trials))
-                if bar.disable:  # the output is no terminal
-                    log.info("%s", progress)
+                _show(progress, bar)
     pack(arguments.out)
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
     return 0
+
+
+def _show(progress: StudyProgress, bar: "tqdm[NoReturn]") -> None:
+    """In the bar, or as a line where the output is no terminal."""
+    bar.set_description_str(str(progress))
+    if bar.disable:
+        log.info("%s", progress)
 
 
 @contextmanager
