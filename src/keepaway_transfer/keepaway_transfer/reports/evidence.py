@@ -133,12 +133,12 @@ def _are_paired(one: Evidence, name: str, other: Evidence, other_name: str) -> b
     first, second = one.row(name), other.row(other_name)
     if one is other:
         return one.study.are_paired(first, second)
-    if not (first.stages and second.stages) or not _same_world(one, other):
+    if not (first.stages and second.stages) or not of_one_world(one, other):
         return False
     return one.study.source_name(first, 0) == other.study.source_name(second, 0)
 
 
-def _same_world(one: Evidence, other: Evidence) -> bool:
+def of_one_world(one: Evidence, other: Evidence) -> bool:
     """Do equal seeds give equal source runs in both studies?"""
     names = ("seed", "field", "profile", "world", "learner", "ordering", "widths", "shared_keepers")
     versions = {record.code_version for each in (one, other) for record in each.results.records}

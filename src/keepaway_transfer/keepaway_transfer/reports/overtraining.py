@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from keepaway_transfer.reports.evidence import Evidence, Studies, difference
+from keepaway_transfer.reports.evidence import Evidence, Studies, difference, of_one_world
 from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT
 from keepaway_transfer.reports.page_parts import (
     Lines,
@@ -26,6 +26,12 @@ WAYS = {
 SMALLER = ("table2_rescaled", "table2_scaled", "table2_averaged_scaled")
 """Those that make everything smaller that much training left too large."""
 MUCH = ("6000", "9000")
+
+
+_OTHER_WORLD = (
+    "Played by another version than Table 2, on source runs of its own, so that its rows are"
+    " compared as independent ones:"
+)
 
 
 class Carried(NamedTuple):
@@ -74,6 +80,8 @@ def by_other_ways(studies: Studies) -> Lines:
             f" | {spread(after.target)} | {spread(one.saved)} | {one.p_value:.2g} | {one.verdict} |"
         )
     ways = list(dict.fromkeys(one.study for one in found))
+    if others := [name for name in ways if not of_one_world(rho, studies[name])]:
+        lines += ["", f"{_OTHER_WORLD} {listed([f'`{name}`' for name in others])}."]
     lines += ["", *(_said(name, [one for one in found if one.study == name]) for name in ways)]
     if (why := _why(found)) is not None:
         lines.append(why)
