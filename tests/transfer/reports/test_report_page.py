@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from keepaway_transfer.errors import StudyError
 from keepaway_transfer.reports.evidence import (
     Evidence,
     beyond_optimism,
@@ -16,7 +17,7 @@ from keepaway_transfer.reports.evidence import (
 from keepaway_transfer.reports.page import page
 from keepaway_transfer.reports.page_figures import page_figures
 from keepaway_transfer.studies.records import Record
-from keepaway_transfer.studies.results import StudyResults
+from keepaway_transfer.studies.results import StudyResults, StudyTrial, open_results
 from keepaway_transfer.studies.study import load_study
 
 OVER = {0: 30.0, 1000: 16.0, 6000: 45.0, 9000: 55.0}
@@ -157,4 +158,15 @@ def test_rows_of_two_studies_are_pairs_where_they_share_their_source_runs(studie
 
 def test_a_folder_without_studies_is_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no studies' results"):
+        read_evidence(tmp_path)
+
+
+def test_a_row_of_one_trial_is_refused_by_name(tmp_path):
+    study = attrs.evolve(load_study("tiny"), trials=1)
+    with open_results(tmp_path / "tiny", study, command="x", code_version="v1") as results:
+        for row in study.rows:
+            results.append(StudyTrial(row.name, 0, (), (50,) * 60, (), "v1"))
+    with pytest.raises(
+        StudyError, match="tiny: row '0' has too few trials to be compared: 1, not 2"
+    ):
         read_evidence(tmp_path)

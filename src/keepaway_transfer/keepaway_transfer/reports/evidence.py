@@ -1,5 +1,6 @@
 """Studies side by side: what rows of one study, or of two, differ by."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,9 @@ from keepaway_transfer.reports.summary import (
 )
 from keepaway_transfer.studies.results import STUDY_FILE, StudyResults, read_results
 from keepaway_transfer.studies.study import Row, Study
+
+FEWEST_TRIALS = 2
+"""Of a row: one alone has no spread."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +71,26 @@ def read_evidence(folder: Path | str) -> dict[str, Evidence]:
     """All studies whose results lie in this folder, each in one of its own, by folder's name.
 
     Raises:
-        StudyError: there are none.
+        StudyError: there are none, or a row has too few trials to be compared.
     """
     folders = sorted(path.parent for path in Path(folder).glob(f"*/{STUDY_FILE}"))
     if not folders:
         raise StudyError(f"{folder} holds no studies' results: no folder in it has a {STUDY_FILE}")
-    return {each.name: Evidence(read_results(each)) for each in folders}
+    studies = {each.name: Evidence(read_results(each)) for each in folders}
+    for name, one in studies.items():
+        _check_trials(Path(folder) / name, one)
+    return studies
+
+
+def _check_trials(folder: Path, one: Evidence) -> None:
+    counts = Counter(record.row for record in one.results.records)
+    for row in one.study.rows:
+        if counts[row.name] < FEWEST_TRIALS:
+            raise StudyError(
+                f"{folder}: row {row.name!r} has too few trials to be compared:"
+                f" {counts[row.name]}, not {FEWEST_TRIALS}; scripts/study.py with --resume and"
+                " --trials adds some"
+            )
 
 
 def difference(
