@@ -166,7 +166,5 @@ def test_a_row_of_one_trial_is_refused_by_name(tmp_path):
     with open_results(tmp_path / "tiny", study, command="x", code_version="v1") as results:
         for row in study.rows:
             results.append(StudyTrial(row.name, 0, (), (50,) * 60, (), "v1"))
-    with pytest.raises(
-        StudyError, match="tiny: row '0' has too few trials to be compared: 1, not 2"
-    ):
+    with pytest.raises(StudyError, match=r"tiny: row '0' has too few trials .*: 1, not 2"):
         read_evidence(tmp_path)
