@@ -101,7 +101,7 @@ def table(figures: dict[str, float]) -> str:
     lines = [f"{'figure':22s} {'value':>10s}  ratio"]
     for name, value in figures.items():
         ratio = f"{value / floor:5.1f} x floor" if floor and name.endswith("_us") else ""
-        if name in ("ros_match_cps", "ros_recorded_cps", "ros_bag_cps", "ros_single_process_cps"):
+        if name.startswith("ros_") and name != "ros_floor_cps":
             ratio = f"{value / figures['ros_floor_cps']:5.2f} x ros_floor"
         lines.append(f"{name:22s} {value:10.2f}  {ratio}")
     return "\n".join(lines)

@@ -20,7 +20,10 @@ DOMAIN = 93  # so that it receives no match
 def measure_ros(args: argparse.Namespace) -> dict[str, float]:
     """Cycles a second (wall time) of a ping-pong of a match's messages, and of matches."""
     os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
-    figures = {"ros_floor_cps": ping_pong(num_players=5, cycles=3000)}
+    figures = {
+        "ros_floor_cps": ping_pong(num_players=5, cycles=3000),
+        "ros_overheard_cps": ping_pong(num_players=5, cycles=3000, is_overheard=True),
+    }
     with tempfile.TemporaryDirectory() as folder:
         recorder = [sys.executable, str(SCRIPTS / "record.py"), str(Path(folder) / "recorded")]
         length = "--episodes", str(args.episodes)
@@ -48,17 +51,27 @@ def match_command(*options: str) -> list[str]:
     return [*command, "--keeper-policy", "learn", "--json", *options]
 
 
-def ping_pong(num_players: int, cycles: int) -> float:
-    """Perceptions to as many processes, an answer from each, by the fastest sound method."""
+def ping_pong(num_players: int, cycles: int, is_overheard: bool = False) -> float:
+    """Perceptions to as many processes, an answer from each, by the fastest sound method.
+
+    Args:
+        num_players: processes that answer.
+        cycles: perceptions of each.
+        is_overheard: by one more process, to which everything is sent, too, and which reads
+            nothing: as much as the middleware alone costs of any recorder.
+
+    Returns:
+        cycles a second, by the wall's clock.
+    """
     import rclpy
     from rclpy.experimental import EventsExecutor
 
     from keepaway_msgs.msg import ActionRequest, Perception
 
-    echo = (
-        f"import sys; sys.path.insert(0, {str(HERE)!r}); import benchmark_ros; benchmark_ros.echo("
-    )
-    players = [subprocess.Popen([sys.executable, "-c", f"{echo}{p})"]) for p in range(num_players)]
+    code = f"import sys; sys.path.insert(0, {str(HERE)!r}); import benchmark_ros; benchmark_ros."
+    calls = [f"echo({p})" for p in range(num_players)]
+    calls += [f"overhear({num_players})"] * is_overheard
+    players = [subprocess.Popen([sys.executable, "-c", code + call]) for call in calls]
     rclpy.init()
     node = rclpy.create_node("ping", enable_rosout=False, start_parameter_services=False)
     executor = EventsExecutor()
@@ -72,6 +85,9 @@ def ping_pong(num_players: int, cycles: int) -> float:
     for p in range(num_players):
         node.create_subscription(ActionRequest, f"bench_{p}/pong", take, 10)
     message = perception(num_players)
+    receivers = 1 + is_overheard
+    while any(ping.get_subscription_count() < receivers for ping in pings):
+        time.sleep(0.05)
     try:
         for cycle in range(-100, cycles):
             if cycle == 0:
@@ -134,6 +150,21 @@ def echo(player: int) -> None:
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+
+
+def overhear(num_players: int) -> None:
+    """Receive what all of them send, and read none of it."""
+    import rclpy
+
+    from keepaway_msgs.msg import ActionRequest, Perception
+
+    rclpy.init()
+    node = rclpy.create_node("overhears", enable_rosout=False, start_parameter_services=False)
+    for p in range(num_players):
+        node.create_subscription(Perception, f"bench_{p}/ping", print, 10, raw=True)
+        node.create_subscription(ActionRequest, f"bench_{p}/pong", print, 10, raw=True)
+    while rclpy.ok():
+        time.sleep(0.1)
 
 
 def first_cycle() -> float:

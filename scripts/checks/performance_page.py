@@ -63,6 +63,12 @@ TABLES = {
     ),
     "Over ROS, by the wall's clock, 3v2, six processes": (
         Row("ping-pong of a match's messages", ROS_FLOOR, "{:,.0f} cycles/s"),
+        Row(
+            "ditto, all of it sent to one more process, too, that reads nothing",
+            "ros_overheard_cps",
+            "{:,.0f} cycles/s",
+            ROS_FLOOR,
+        ),
         Row("a match of learning keepers", "ros_match_cps", "{:,.0f} cycles/s", ROS_FLOOR),
         Row("recorded by the simulator", "ros_bag_cps", "{:,.0f} cycles/s", "ros_match_cps"),
         Row("recorded by the recorder", "ros_recorded_cps", "{:,.0f} cycles/s", "ros_match_cps"),
