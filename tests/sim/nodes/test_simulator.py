@@ -206,7 +206,9 @@ def test_a_match_ends_when_ros_is_shut_down(ros_domain: int) -> None:
         spins.append(timeout)
         context.try_shutdown()
 
-    Simulator(context=context).play(spin)
+    simulator = Simulator(context=context)
+    simulator.play(spin)
+    simulator.destroy_node()  # the next test's simulator would hear its match
     assert len(spins) == 1
 
 
