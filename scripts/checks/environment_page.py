@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from page_parts import with_part
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "src/keepaway_agent/examples"))
@@ -47,13 +48,8 @@ def keep(figures: Mapping[str, Any]) -> None:
 def written(text: str, figures: Mapping[str, Any]) -> str:
     """The page with its parts written from the figures."""
     for name, figure in figures.items():
-        begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
-        before, _, rest = text.partition(begin)
-        _, found, after = rest.partition(end)
-        if not found:
-            raise SystemExit(f"{PAGE.name}: no part {name}")
         made = f"`{figure['command']}`, version {figure['code_version']}"
-        text = f"{before}{begin}{PARTS[name](figure)}\n\n{made}\n{end}{after}"
+        text = with_part(text, name, f"{PARTS[name](figure)}\n\n{made}\n", PAGE)
     return text
 
 

@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from page_parts import with_part
+
 from keepaway_transfer.reports.evidence import Evidence, Studies, difference, read_evidence
 from keepaway_transfer.reports.statistics import Comparison, Interval
 
@@ -54,12 +56,7 @@ def written(text: str) -> str:
     fidelity = json.loads((ROOT / "src/keepaway_sim/docs/fidelity.json").read_text())
     parts = {"results": results(studies), "fidelity": nearness(fidelity["cells"])}
     for name, lines in parts.items():
-        begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
-        before, _, rest = text.partition(begin)
-        _, found, after = rest.partition(end)
-        if not found:
-            raise SystemExit(f"readme: {PAGE.name} has no part {name}")
-        text = "\n".join([before + begin, *lines, "", end + after])
+        text = with_part(text, name, "\n".join(["", *lines, "", ""]), PAGE)
     return text
 
 
