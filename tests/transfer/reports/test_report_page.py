@@ -33,7 +33,7 @@ def record(row, number, target, source=0.0, initial=5.0):
     )  # fmt: skip
 
 
-def study_of(name, mean_of, trials=12, shift=0.0):
+def study_of(name, mean_of, trials=12, shift=0.0, code_version="v1"):
     """StudyResults in which trials lie one hour apart around their row's mean."""
     study = load_study(name)
     spread = np.arange(trials) - (trials - 1) / 2 + shift
@@ -42,11 +42,12 @@ def study_of(name, mean_of, trials=12, shift=0.0):
         for row in study.rows
         for k in range(trials)
     ]
-    return Evidence(StudyResults(study, f"scripts/study.py {name}", "v1", tuple(records)))
+    records = [dataclasses.replace(one, code_version=code_version) for one in records]
+    return Evidence(StudyResults(study, f"scripts/study.py {name}", code_version, tuple(records)))
 
 
-def table(name, best):
-    return study_of(name, lambda row: best.get(row.source_episodes, 25.0))
+def table(name, best, **how):
+    return study_of(name, lambda row: best.get(row.source_episodes, 25.0), **how)
 
 
 @pytest.fixture
@@ -154,6 +155,15 @@ def test_rows_of_two_studies_are_pairs_where_they_share_their_source_runs(studie
         dataclasses.replace(at_5.results, study=attrs.evolve(at_5.results.study, seed=1))
     )
     assert difference((table2, "1000"), (other, "1000"), "target_hours").low < 4.0
+
+
+@pytest.mark.parametrize(("shift", "are_pairs"), [(0.0, True), (0.01, False)])
+def test_studies_of_two_versions_have_pairs_where_their_trials_from_scratch_are_the_same(
+    studies, shift, are_pairs
+):
+    later = table("table2_at_5", OVER, shift=shift, code_version="v2")
+    saved = difference((studies["table2"], "1000"), (later, "1000"), "target_hours")
+    assert (saved.low == saved.high) == are_pairs
 
 
 def test_a_folder_without_studies_is_refused(tmp_path):

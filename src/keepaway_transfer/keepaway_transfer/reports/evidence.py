@@ -157,9 +157,13 @@ def _are_paired(one: Evidence, name: str, other: Evidence, other_name: str) -> b
 
 
 def of_one_world(one: Evidence, other: Evidence) -> bool:
-    """Do equal seeds give equal source runs in both studies?"""
+    """Do equal seeds give equal source runs in both studies?
+
+    They do in equal worlds and for equal learners, where one version of the code played both, or
+    versions that play alike: the trials from scratch are the same.
+    """
     names = ("seed", "field", "profile", "world", "learner", "ordering", "widths", "shared_keepers")
+    if any(getattr(one.study, name) != getattr(other.study, name) for name in names):
+        return False
     versions = {record.code_version for each in (one, other) for record in each.results.records}
-    return len(versions) == 1 and all(
-        getattr(one.study, name) == getattr(other.study, name) for name in names
-    )
+    return len(versions) == 1 or scratch_difference(one, other) is None

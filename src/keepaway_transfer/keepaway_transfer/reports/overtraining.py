@@ -29,8 +29,8 @@ MUCH = ("6000", "9000")
 
 
 _OTHER_WORLD = (
-    "Played by another version than Table 2, on source runs of its own, so that its rows are"
-    " compared as independent ones:"
+    "Played by a version that plays otherwise than Table 2's, on source runs of its own, so that"
+    " its rows are compared as independent ones:"
 )
 
 
@@ -91,7 +91,7 @@ def by_other_ways(studies: Studies) -> Lines:
 
 
 def carried(studies: Studies) -> list[Carried]:
-    """What every other way saves against rho, as pairs."""
+    """What every other way saves against rho, as pairs where both have the same source runs."""
     rho = studies["table2"]
     cells = [
         (name, row, difference((rho, row), (studies[name], row), "target_hours"))
