@@ -26,7 +26,7 @@ class KeepawayAECEnv(OneFieldEnv, AECEnv[str, np.ndarray, int]):
     ball; a taker between going to the ball (0) and marking K(k+1) (k), every five cycles. All
     choose on what they believe at the same moment, and then the field plays on to the next
     choice. Every cycle pays 1 to each keeper and -1 to each taker, so what `last` gives an agent
-    is the reward since its own last choice, as for a learner of Taylor & Stone (2005).
+    is the reward since its own last choice, as for a learner of Taylor & Stone (2004).
     """
 
     metadata: ClassVar[dict[str, Any]] = {

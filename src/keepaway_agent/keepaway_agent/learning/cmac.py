@@ -1,6 +1,6 @@
 """Tile coding (CMAC): the value of an action as a sum of weights of active tiles.
 
-Every state variable is tiled alone (Taylor & Stone 2005; Stone & Sutton 2002): 32 one-dimensional
+Every state variable is tiled alone (Taylor & Stone 2004; Stone & Sutton 2002): 32 one-dimensional
 tilings, each shifted by 1/32 of a tile's width against the one before. A value x of the variable
 lies in one tile of every tiling, so 32 tiles are active per variable, and an action's value is
 the sum of the active tiles' weights over all variables.

@@ -1,6 +1,6 @@
 """State variables: what a learner knows of the field, from its own player's perception.
 
-A keeper with the ball sees the 4n + 2m - 3 variables of Taylor & Stone (2005), which are those of
+A keeper with the ball sees the 4n + 2m - 3 variables of Taylor & Stone (2004), which are those of
 Stone & Sutton (2002) for any n keepers and m takers: 13 for 3v2, 19 for 4v3, 25 for 5v4. K1 is
 the keeper with the ball, K2..Kn are the others and T1..Tm the takers, by rank; C is the field's
 centre. A learning taker sees the variables of `taker_features`.

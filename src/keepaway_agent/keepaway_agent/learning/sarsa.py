@@ -1,4 +1,4 @@
-"""SMDP Sarsa(lambda) with replacing traces on a CMAC (Taylor & Stone 2005; Sutton & Barto 1998).
+"""SMDP Sarsa(lambda) with replacing traces on a CMAC (Taylor & Stone 2004; Sutton & Barto 1998).
 
 A learner decides now and then; between two decisions time passes, so the problem is a semi-Markov
 one (SMDP). Names follow the usual ones: q_tm1 is the value of the action chosen last, r_t and

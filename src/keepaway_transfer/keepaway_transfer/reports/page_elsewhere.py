@@ -5,7 +5,7 @@ from typing import Any
 from keepaway_transfer.reports.page_parts import Lines, own_picture
 
 PAPER = [
-    "Taylor & Stone (2005) train 4v3 keepers until they hold the ball for 9.0 s on average over"
+    "Taylor & Stone (2004) train 4v3 keepers until they hold the ball for 9.0 s on average over"
     " 1,000 episodes, from scratch and after 10 to 9,000 episodes of 3v2 that rho carries over."
     " They report that every amount of 3v2 shortens the time in 4v3, that some shorten the time in"
     " all,"
