@@ -13,6 +13,7 @@ from keepaway_transfer.reports.evidence import (
     difference,
     read_evidence,
     scratch_difference,
+    twins,
 )
 from keepaway_transfer.reports.page import page
 from keepaway_transfer.reports.page_figures import page_figures
@@ -70,8 +71,9 @@ def test_transfer_is_compared_with_the_best_optimistic_start(studies):
 def test_the_page_says_what_optimism_explains(studies):
     text = page(studies)
     assert "The best level is 5 s: 18.00 [" in text
-    assert "the optimistic start 12.00 [" in text
-    assert "h: 86% of it, without a source." in text
+    assert "the best constant, without a source, 12.00 [" in text
+    assert "h: rho takes 2.00 [-1.05, 5.05] h less of 4v3 than the constant." in text
+    assert "The middle trials take 16.0 h and 18.0 h." in text
 
 
 def test_table2_is_measured_at_a_lower_threshold_where_its_episodes_are_known(studies):
@@ -88,17 +90,18 @@ def test_table2_is_measured_at_a_lower_threshold_where_its_episodes_are_known(st
 
 def test_a_way_that_never_hurts_is_told_from_one_that_does(studies):
     lines = {line.split("|")[1].strip(): line for line in page(studies).splitlines() if "|" in line}
-    assert "| worse after 6000, 9000 | worse after 3000, 6000, 9000 |" in lines["`table2`"]
-    assert lines["`table2_at_5`"].count("| yes | yes | after 1000: 6.00 [") == 1
-    assert lines["`table2_at_5`"].count("| saves | after 1000: 4.00 [") == 1
-    assert "In 4v3 hours the best optimistic start is beaten by `table2_at_5`" in page(studies)
-    assert "than from scratch or from the best optimistic start: `table2_at_5`." in page(studies)
+    rho, at_5 = lines["`table2`"], lines["`table2_at_5`"]
+    assert "| after 6000, 9000 (at most 28.0 h) | after 3000, 6000, 9000 (at most 40.0 h) |" in rho
+    assert "| no | not shown (at most 3.1 h) | after 1000: 6.00 [" in at_5
+    assert at_5.count("| saves | after 1000: 4.00 [") == 1
+    assert "In 4v3 hours the best constant start is beaten by `table2_at_5`" in page(studies)
+    assert "than from scratch or from the best constant start: `table2_at_5`." in page(studies)
 
 
 def test_the_page_says_what_the_best_row_adds_to_the_best_optimistic_start(studies):
     text = page(studies)
-    assert "with the least hours in all is 1000: against" in text
-    assert "start it saves 0.00 [-3.05, 3.05] h in all" in text
+    assert "with the least hours in all is that after 1000 episodes" in text
+    assert "it takes 0.00 [-3.05, 3.05] h less in all than the best constant start" in text
 
 
 def test_what_the_way_of_carrying_alone_saves_after_too_much_training_is_told(studies):
@@ -108,16 +111,16 @@ def test_what_the_way_of_carrying_alone_saves_after_too_much_training_is_told(st
     )
     text = page(studies)
     assert "After 6,000 episodes 4v3 takes 45.00 [" in text
-    assert "h as `rescaled` does: 25.00 [25.00, 25.00] h are saved by the way of carrying" in text
+    assert "h as `rescaled` does: the way of carrying alone takes 25.00 [25.00, 25.00] h" in text
     assert "`variants_6000`, against optimistic at 5 s:" in text
 
 
 @pytest.mark.parametrize(
     ("at_5", "rescaled", "said"),
     [
-        (0.0, 9.0, "to lower every value by the same does not help there, to make all weights"),
-        (9.0, 0.0, "So after much 3v2 over-estimation slows learning."),
-        (0.0, 0.0, "So over-estimation is not what slows learning after much 3v2."),
+        (0.0, 9.0, "to lower every value by the same is not shown to help there, to make all"),
+        (9.0, 0.0, "So after much 3v2 too high a mean value slows learning."),
+        (0.0, 0.0, "So it is not shown that over-estimation slows learning after much 3v2."),
     ],
 )
 def test_what_slows_learning_after_much_source_is_told_by_which_way_helps(
@@ -137,7 +140,7 @@ def test_studies_that_were_not_run_are_named_with_their_command(studies):
 
 def test_equal_scratch_rows_are_the_same_trials(studies):
     assert scratch_difference(studies["optimistic"], studies["table2"]) is None
-    assert "- `optimistic`: the same trials" in page(studies)
+    assert "- `table2_at_5` and `optimistic`: Table 2's trials" in page(studies)
 
 
 def test_scratch_rows_of_other_trials_differ_by_a_number_of_hours(studies):
@@ -164,6 +167,33 @@ def test_studies_of_two_versions_have_pairs_where_their_trials_from_scratch_are_
     later = table("table2_at_5", OVER, shift=shift, code_version="v2")
     saved = difference((studies["table2"], "1000"), (later, "1000"), "target_hours")
     assert (saved.low == saved.high) == are_pairs
+
+
+def test_a_row_that_two_studies_played_from_sources_of_their_own_is_shown_beside_itself(studies):
+    assert twins(studies) == []
+    studies["variants_1000"] = study_of(
+        "variants_1000", lambda row: 20.0 if row.name == "rho" else 30.0
+    )
+    (found,) = (one for one in twins(studies) if one.first == ("table2", "1000"))
+    assert found.second == ("variants_1000", "rho")
+    assert found.saved.difference == pytest.approx(16.0 - 20.0)
+    assert "| `table2`, 1000 | 16.00 [" in page(studies)
+
+
+def test_what_was_chosen_on_some_trials_is_confirmed_on_others(studies):
+    hours = {0: 18.0, 10: 30.0, 50: 18.0, 100: 8.0}
+    studies["confirmation"] = study_of("confirmation", lambda row: hours[row.source_episodes])
+    said = "of 5 s the time in all is shorter after 100 episodes; longer after 10 episodes; not"
+    assert said in page(studies)
+
+
+def test_the_papers_claims_stand_beside_what_was_seen(studies):
+    lines = {line.split(" | ")[0]: line for line in page(studies).splitlines()}
+    every = lines["| every amount of 3v2 shortens the time in 4v3"]
+    assert "shorter after 10, 50, 100, 250, 500, 1000 and 3000 episodes | not seen |" in every
+    more = lines["| after 9,000 episodes 4v3 takes longer than after 1,000"]
+    assert "| 38.96 [35.93, 41.98] h more | seen |" in more
+    assert lines["| keepers begin hardly better than new ones"].endswith("| seen |")
 
 
 def test_a_folder_without_studies_is_refused(tmp_path):

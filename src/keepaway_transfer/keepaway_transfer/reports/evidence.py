@@ -4,10 +4,12 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 from keepaway_transfer.errors import StudyError
-from keepaway_transfer.reports.statistics import Comparison
+from keepaway_transfer.reports.statistics import Comparison, holm
 from keepaway_transfer.reports.summary import (
     RowSummary,
     TrialMeasures,
@@ -57,6 +59,18 @@ class Evidence:
         """How a row is defined."""
         return next(row for row in self.study.rows if row.name == name)
 
+    @property
+    def has_scratch(self) -> bool:
+        """Does any row of it learn from scratch?"""
+        return self.row(self.scratch).is_scratch
+
+    @property
+    def origin(self) -> str:
+        """How many trials a row has, and of which version of the code they are, in words."""
+        numbers = sorted({row.trials for row in self.rows.values()})
+        versions = sorted({record.code_version for record in self.results.records})
+        return f"{' or '.join(map(str, numbers))} trials a row, {', '.join(versions)}"
+
     def best(self, measure: str) -> str:
         """The row other than scratch with the least hours, `target` or `total`."""
         others = [name for name in self.rows if name != self.scratch]
@@ -103,11 +117,56 @@ def difference(
     """
     (one, name), (other, other_name) = first, second
     return compare(
-        one.trials(name),
-        other.trials(other_name),
-        measure,
-        _are_paired(one, name, other, other_name),
+        one.trials(name), other.trials(other_name), measure, num_pairs(first, second) > 0
     )
+
+
+def num_pairs(first: tuple[Evidence, str], second: tuple[Evidence, str]) -> int:
+    """How many trials of a row have a partner in another; 0 if the rows are independent."""
+    (one, name), (other, other_name) = first, second
+    if not _are_paired(one, name, other, other_name):
+        return 0
+    return len({x.trial for x in one.trials(name)} & {x.trial for x in other.trials(other_name)})
+
+
+class Twins(NamedTuple):
+    """One row, played in two studies on source runs that have nothing in common."""
+
+    first: tuple[str, str]  # study and row
+    second: tuple[str, str]
+    saved: Comparison  # hours of the target task less in the second
+    p_value: float  # adjusted over all twins
+
+
+def twins(studies: Studies) -> list[Twins]:
+    """Rows that start alike in two studies to one goal, but from source runs of their own.
+
+    By how much they differ shows what the draw of source runs is worth. Studies of an earlier
+    world, which have a note, are left out.
+    """
+    known = [(name, one) for name, one in studies.items() if not one.results.note]
+    found = [
+        ((name, row.name), (other_name, other_row.name), (one, row.name), (other, other_row.name))
+        for (name, one), (other_name, other) in combinations(known, 2)
+        if have_one_goal(one, other)
+        for row in one.study.rows
+        for other_row in other.study.rows
+        if row.stages
+        and (row.origin(), row.widths) == (other_row.origin(), other_row.widths)
+        and not num_pairs((one, row.name), (other, other_row.name))
+    ]
+    saved = [difference(first, second, "target_hours") for *_, first, second in found]
+    p_values = [float(p) for p in holm([one.p_value for one in saved])]
+    return [
+        Twins(first, second, comparison, p_value)
+        for (first, second, *_), comparison, p_value in zip(found, saved, p_values, strict=True)
+    ]
+
+
+def have_one_goal(one: Evidence, other: Evidence) -> bool:
+    """Are both studies' hours those of one task to one threshold?"""
+    names = "target", "threshold", "window", "max_hours"
+    return all(getattr(one.study, name) == getattr(other.study, name) for name in names)
 
 
 def beyond_optimism(

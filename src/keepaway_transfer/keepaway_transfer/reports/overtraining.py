@@ -2,16 +2,24 @@
 
 from typing import NamedTuple
 
-from keepaway_transfer.reports.evidence import Evidence, Studies, difference, of_one_world
+from keepaway_transfer.reports.evidence import (
+    Evidence,
+    Studies,
+    difference,
+    num_pairs,
+    of_one_world,
+)
 from keepaway_transfer.reports.never_hurts import NEVER_WORSE_AT
 from keepaway_transfer.reports.page_parts import (
     Lines,
+    by_verdict,
+    less,
     listed,
     not_run,
     shown_picture,
     study_table,
 )
-from keepaway_transfer.reports.report import spread
+from keepaway_transfer.reports.report import shown_p, spread
 from keepaway_transfer.reports.statistics import Comparison, holm
 from keepaway_transfer.reports.summary import verdict
 
@@ -39,6 +47,7 @@ class Carried(NamedTuple):
 
     study: str
     row: str
+    pairs: int  # that the comparison is of; 0: the rows are independent
     saved: Comparison  # hours of 4v3 less than by rho
     p_value: float  # adjusted over all rows and ways
     verdict: str
@@ -49,10 +58,11 @@ def overtraining(studies: Studies) -> Lines:
     missing = [name for name in ("table2", "table2_at_5") if name not in studies]
     lines = [
         "An action's value is a sum over state variables, 13 in 3v2 and 19 in 4v3: copied weights"
-        " expect half as much again as 3v2 gave, and late 3v2 gives far more than 4v3 can. If"
-        " over-estimated values are the reason, the same weights at a lower level must be learned"
-        " from faster. If it is what differs between states and actions, it helps to make all"
-        " weights smaller. If the skills are too special for 3v2, neither helps.",
+        " expect half as much again as 3v2 gave, and late 3v2 gives far more than 4v3 can. Three"
+        " explanations, which do not exclude one another: if the mean value is too high, the same"
+        " weights at a lower level must be learned from faster; if differences between states and"
+        " actions are too large as well, it helps to make all weights smaller; if the skills are"
+        " too special for 3v2, neither helps.",
         "",
         *(not_run(*missing) if missing else by_other_ways(studies)),
     ]
@@ -70,14 +80,15 @@ def by_other_ways(studies: Studies) -> Lines:
     rho, found = studies["table2"], carried(studies)
     lines = [
         "| way | episodes of 3v2 | level that rho carries (s) | 4v3 hours by rho | so carried"
-        " | 4v3 hours saved | p | |",
-        "|---|---|---|---|---|---|---|---|",
+        " | pairs | 4v3 hours saved | p | |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for one in found:
         before, after = rho.rows[one.row], studies[one.study].rows[one.row]
         lines.append(
             f"| {WAYS[one.study]} | {one.row} | {before.start_level:.1f} | {spread(before.target)}"
-            f" | {spread(after.target)} | {spread(one.saved)} | {one.p_value:.2g} | {one.verdict} |"
+            f" | {spread(after.target)} | {one.pairs or '-'} | {spread(one.saved)}"
+            f" | {shown_p(one.p_value)} | {one.verdict} |"
         )
     ways = list(dict.fromkeys(one.study for one in found))
     if others := [name for name in ways if not of_one_world(rho, studies[name])]:
@@ -94,29 +105,29 @@ def carried(studies: Studies) -> list[Carried]:
     """What every other way saves against rho, as pairs where both have the same source runs."""
     rho = studies["table2"]
     cells = [
-        (name, row, difference((rho, row), (studies[name], row), "target_hours"))
+        (
+            name,
+            row,
+            num_pairs((rho, row), (studies[name], row)),
+            difference((rho, row), (studies[name], row), "target_hours"),
+        )
         for name in WAYS
         if name in studies
         for row in NEVER_WORSE_AT
         if row in rho.rows and row in studies[name].rows
     ]
-    p_values = [float(p) for p in holm([saved.p_value for _, _, saved in cells])]
+    p_values = [float(p) for p in holm([saved.p_value for *_, saved in cells])]
     return [
-        Carried(*cell, p_value, verdict(cell[2], p_value))
+        Carried(*cell, p_value, verdict(cell[-1], p_value))
         for cell, p_value in zip(cells, p_values, strict=True)
     ]
 
 
 def _said(name: str, found: list[Carried]) -> str:
-    """After how many episodes a way saves hours, in words."""
-    helped = [one.row for one in found if one.verdict == "saves"]
-    others = [one.row for one in found if one.verdict != "saves"]
-    what = f"{WAYS[name][0].upper()}{WAYS[name][1:]} (`{name}`):"
-    if not others:
-        return f"{what} this saves hours after {listed(helped)} episodes."
-    if not helped:
-        return f"{what} this saves none."
-    return f"{what} this saves hours after {listed(helped)} episodes, none after {listed(others)}."
+    """What a way gives after each number of episodes, in words."""
+    what = f"{WAYS[name][0].upper()}{WAYS[name][1:]} (`{name}`)"
+    verdicts = by_verdict({one.row: one.verdict for one in found}, "after {} episodes")
+    return f"{what}: the time in 4v3 is, beside rho's, {verdicts}."
 
 
 def _why(found: list[Carried]) -> str | None:
@@ -125,14 +136,15 @@ def _why(found: list[Carried]) -> str | None:
     if not all(("table2_at_5", row) in saves for row in MUCH):
         return None
     if any(saves["table2_at_5", row] for row in MUCH):
-        return "So after much 3v2 over-estimation slows learning."
+        return "So after much 3v2 too high a mean value slows learning."
     smaller = [name for name in SMALLER if all(saves.get((name, row), False) for row in MUCH)]
     if smaller:
         return (
-            "So it is not over-estimation alone that slows learning after much 3v2: to lower every"
-            " value by the same does not help there, to make all weights smaller does."
+            "So it is not the mean value alone that slows learning after much 3v2: to lower every"
+            " value by the same is not shown to help there, to make all weights smaller is. Which"
+            " of the differences between states and actions are too large, this does not tell."
         )
-    return "So over-estimation is not what slows learning after much 3v2."
+    return "So it is not shown that over-estimation slows learning after much 3v2."
 
 
 def _best_way(one: Evidence) -> Lines:
@@ -146,6 +158,5 @@ def _best_way(one: Evidence) -> Lines:
     return [
         f"After {most:,} episodes 4v3 takes {spread(one.rows[plain].target)} h as rho carries them"
         f" and {spread(one.rows[best].target)} h as `{one.row(best).variant}` does:"
-        f" {spread(saved)} h are saved by the way of carrying alone, and {spread(gain)} h against"
-        " scratch.",
+        f" the way of carrying alone takes {less(saved)}, and {less(gain)} than scratch.",
     ]

@@ -4,27 +4,36 @@ Every number on it is worked out of the committed trials, or read from `elsewher
 what was measured on the real server. A study that was not run is named with the command to run it.
 """
 
+from statistics import median
+
+from keepaway_transfer.metrics import SECONDS_PER_HOUR
 from keepaway_transfer.reports.evidence import (
     Evidence,
     Studies,
     beyond_optimism,
-    scratch_difference,
+    difference,
 )
 from keepaway_transfer.reports.never_hurts import best_way, never_hurts
 from keepaway_transfer.reports.overtraining import overtraining
+from keepaway_transfer.reports.page_claims import claims
+from keepaway_transfer.reports.page_data import data, history
 from keepaway_transfer.reports.page_elsewhere import PAPER, others, real_server
 from keepaway_transfer.reports.page_parts import (
+    AFTER_EPISODES,
     Lines,
     elsewhere,
+    less,
+    listed,
     not_run,
+    note,
     own_picture,
     said_of,
     shown_picture,
     study_table,
 )
-from keepaway_transfer.reports.report import power, spread
+from keepaway_transfer.reports.report import power, shown_p, spread
 from keepaway_transfer.reports.statistics import holm
-from keepaway_transfer.reports.summary import verdict
+from keepaway_transfer.reports.summary import values, verdict
 
 LOWER_THRESHOLD = 8.2  # [s] at which Table 2 is measured a second time
 
@@ -37,36 +46,58 @@ def page(studies: Studies) -> str:
     """
     measured = elsewhere()
     sections = [
-        ["# What transfer is worth", "", *_opening()],
+        ["# What transfer is worth", "", *_opening(studies)],
         ["## What the paper claims", "", *PAPER],
         ["## What was seen here, row by row", "", *_rows(studies)],
         ["## What optimism explains", "", *_optimism(studies)],
         ["## What transfer adds beyond it", "", *_beyond(studies)],
         ["## What too much training does, and why", "", *overtraining(studies)],
-        ["## What the real server showed", "", *real_server(measured["real_server"])],
+        [
+            "## What the real server showed",
+            "",
+            *real_server(measured["real_server"], studies.get("table2")),
+        ],
         ["## What others measured", "", *others(measured["others"])],
         ["## A transfer that never hurts", "", *never_hurts(studies)],
-        ["## The data", "", *_data(studies)],
-        ["## How the figures changed", "", *_history(studies)],
+        ["## The data", "", *data(studies)],
+        ["## How the figures changed", "", *history(studies)],
     ]
     return "\n\n".join("\n".join(lines) for lines in sections) + "\n"
 
 
-EARLIER_WORLD = [
-    "The world of version e3f9ad8 differed from the real server in learned play: keepers chose"
-    " again in every cycle of a pass, rewards counted from the decision, and who marks skipped the"
-    " ball holder. Now these are the real players' rules, and Table 2 was played anew. In the world"
-    " before, much 3v2 made 4v3 slower than from scratch.",
-]  # fmt: skip
-
-
-def _opening() -> Lines:
+def _opening(studies: Studies) -> Lines:
     return [
         "This page is written by `scripts/analyze.py src/keepaway_transfer/results --page` from the"
-        " trials in that folder. Hours are simulated; intervals, in brackets, are of 95 %; errors"
-        " are by trial. Saved hours are positive. Rows are compared as pairs where their trials"
-        " share a source run, else by Welch's test, and p-values are adjusted by Holm over the rows"
-        " of a table.",
+        " trials in that folder.",
+        "",
+        "How to read it:",
+        "",
+        "- **Hours** are of simulated play, while learning and exploring, until keepers hold the"
+        " ball for the threshold on average over the last 1,000 episodes: 9.0 s in 4v3, 7.5 s in"
+        " 5v4. **Total hours** are these and the hours of the source tasks before. Hours of looking"
+        " for a good level or way are in no total.",
+        *_limits(studies),
+        "- **Intervals**, in brackets, are Student's, of 95 %, over trials, each for itself.",
+        "- **Comparisons**: positive hours are saved ones. Trials that share a source run are"
+        " compared as pairs, others by Welch's test. p-values alone are adjusted (by Holm, over the"
+        " rows of a table, for each measure by itself), so an interval may leave out zero where the"
+        " verdict is `open`. `none` says that the interval holds zero and lies within an hour.",
+        "- **A constant start** (also called optimistic, though 2 s is not) has no source: all"
+        " actions of all states are worth the same number of seconds at first. Their mean worth is"
+        " the **level** of any start.",
+    ]
+
+
+def _limits(studies: Studies) -> Lines:
+    """Between which hours Table 2's trials can lie."""
+    if (table2 := studies.get("table2")) is None:
+        return []
+    study = table2.study
+    least = study.window * study.threshold / SECONDS_PER_HOUR
+    return [
+        f"- A trial of Table 2 takes {least:.1f} h at least, for {study.window:,} episodes of"
+        f" {study.threshold:g} s, so short times are pressed together. It ends after"
+        f" {study.max_hours:g} h of 4v3, and counts with these if it did not reach the threshold.",
     ]
 
 
@@ -74,8 +105,12 @@ def _rows(studies: Studies) -> Lines:
     if (table2 := studies.get("table2")) is None:
         return not_run("table2")
     lines = [
-        *said_of(table2, "target", "the time in 4v3"),
-        *said_of(table2, "total", "the time in all"),
+        *claims(studies),
+        "",
+        "### Table 2",
+        "",
+        *said_of(table2, "target", "the time in 4v3", AFTER_EPISODES),
+        *said_of(table2, "total", "the time in all", AFTER_EPISODES),
         "",
         *study_table(table2, table2.scratch, "episodes of 3v2"),
         "",
@@ -84,14 +119,15 @@ def _rows(studies: Studies) -> Lines:
         shown_picture("Hours to 9.0 s by episodes of 3v2", "table2"),
     ]
     lines += _at_lower_threshold(studies)
-    for name, words, figure in (
-        ("figure3", "Figure 3: learning for a fixed time", "learning_curves"),
-        ("fivevfour", "5v4", "time_to_threshold"),
-    ):
-        if (found := studies.get(name)) is not None:
-            lines += ["", f"### {words}", "", *_note(found)]
-            lines += study_table(found, found.scratch, "row")
-            lines += ["", shown_picture(words, name, figure)]
+    if (figure3 := studies.get("figure3")) is not None:
+        lines += ["", "### Figure 3: learning for a fixed time", "", *note(figure3)]
+        lines += [*study_table(figure3, figure3.scratch, "episodes of 3v2"), ""]
+        lines += [*_at_the_end(figure3), ""]
+        lines += [
+            shown_picture("Figure 3: learning for a fixed time", "figure3", "learning_curves")
+        ]
+    if (fivevfour := studies.get("fivevfour")) is not None:
+        lines += ["", "### 5v4", "", *note(fivevfour), *_fivevfour(fivevfour)]
     if (variants := studies.get("variants_1000")) is not None:
         lines += ["", "### Other ways than rho (`variants_1000`)", "", *_parts_of_rho(variants)]
         lines += _variants(variants)
@@ -100,9 +136,29 @@ def _rows(studies: Studies) -> Lines:
     return lines
 
 
-def _note(one: Evidence) -> Lines:
-    """What must be known of a study's trials, such as that they are of an earlier world."""
-    return [one.results.note, ""] if one.results.note else []
+def _at_the_end(figure3: Evidence) -> Lines:
+    """What both rows of Figure 3 hold when the time is over."""
+    before = {figure3.scratch: "from scratch"}
+    held = [
+        f"{spread(row.asymptotic)} s {before.get(name, f'after {name} episodes of 3v2')}"
+        for name, row in figure3.rows.items()
+    ]
+    return [
+        f"In their last {figure3.study.window:,} episodes, after {figure3.study.max_hours:g} h of"
+        f" 4v3, keepers hold the ball for {listed(held)}."
+    ]
+
+
+def _fivevfour(one: Evidence) -> Lines:
+    """5v4 against scratch, and against its best constant start where it has any."""
+    lines = [
+        f"Hours of 5v4 to {one.study.threshold:g} s, after 1,000 episodes of each task before.",
+        "",
+    ]
+    references = [name for name in one.study.references if name in one.rows]
+    for reference in references:
+        lines += [f"Against {reference}:", "", *study_table(one, reference, "before"), ""]
+    return [*lines, shown_picture("5v4", "fivevfour")]
 
 
 def _at_lower_threshold(studies: Studies) -> Lines:
@@ -112,8 +168,12 @@ def _at_lower_threshold(studies: Studies) -> Lines:
         lower = Evidence(table2.results, LOWER_THRESHOLD)
     if lower is None:
         return []
+    words = (
+        "How much depends on the threshold. The end of a trial is known here to"
+        f" {table2.results.records[0].block} episodes."
+    )
     title = f"### The same trials to {LOWER_THRESHOLD:g} s"
-    return ["", title, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
+    return ["", title, "", words, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
 
 
 def _parts_of_rho(variants: Evidence) -> Lines:
@@ -132,9 +192,8 @@ def _parts_of_rho(variants: Evidence) -> Lines:
         f" the level {gain['shape, preferences']}. A mapping that is shuffled saves"
         f" {gain['shuffled']}.",
         "",
-        "At a level of 5 s, shape and preferences save"
-        f" {spread(at_5.target)} h of 4v3 against the constant 5 s, and {spread(at_5.total)} h in"
-        " all, where the hours of 3v2 count.",
+        f"At a level of 5 s, shape and preferences take {less(at_5.target)} of 4v3 than the"
+        f" constant 5 s, and {less(at_5.total)} in all, where the hours of 3v2 count.",
         "",
     ]
 
@@ -156,7 +215,7 @@ def _optimism(studies: Studies) -> Lines:
         " first. The best"
         f" level is {best}: {spread(hours)} h of 4v3"
         f" ({spread(optimistic.rows[optimistic.scratch].target)} from scratch).",
-        *said_of(optimistic, "target", "the time in 4v3"),
+        *said_of(optimistic, "target", "the time in 4v3", "from {}"),
         "",
         *study_table(optimistic, optimistic.scratch, "level"),
         "",
@@ -171,10 +230,16 @@ def _of_transfers_gain(table2: Evidence, optimistic: Evidence, best: str) -> str
     transfer = table2.best("target")
     by_transfer = table2.rows[transfer].against[table2.scratch].target
     by_optimism = optimistic.rows[best].against[optimistic.scratch].target
-    share = by_optimism.difference / by_transfer.difference
+    apart = difference((optimistic, best), (table2, transfer), "target_hours")
+    middle = [
+        f"{median(values(one.trials(name), 'target_hours')):.1f} h"
+        for one, name in ((table2, transfer), (optimistic, best))
+    ]
     return (
-        f"Transfer after {transfer} episodes saves {spread(by_transfer)} h of 4v3 against scratch,"
-        f" the optimistic start {spread(by_optimism)} h: {share:.0%} of it, without a source."
+        f"rho's best row, after {transfer} episodes, saves {spread(by_transfer)} h of 4v3 against"
+        f" scratch, the best constant, without a source, {spread(by_optimism)} h: rho takes"
+        f" {less(apart)} of 4v3 than the constant. The middle trials take {middle[0]} and"
+        f" {middle[1]}."
     )
 
 
@@ -193,27 +258,29 @@ def _beyond_table(studies: Studies) -> Lines:
     _, of_total, at_first = beyond_optimism(studies)[transfer]
     title = "What transfer saves against an optimistic start"
     lines = [
-        f"The row of Table 2 with the least hours in all is {transfer}: against the best optimistic"
-        f" start it saves {spread(of_total)} h in all, and its keepers hold the ball for"
-        f" {spread(at_first)} s longer at first. (Both were chosen as the best on these trials.)",
+        f"The row of Table 2 with the least hours in all is that after {transfer} episodes: it"
+        f" takes {less(of_total)} in all than the best constant start, and its keepers hold the"
+        f" ball for {spread(at_first)} s longer over their first 100 episodes. (Both were chosen as"
+        " the best on these trials.)",
         "",
         *_against_optimism(studies, "table2"),
         "",
         own_picture(title, "beyond_optimism"),
     ]
     if (best := best_way(studies)) != "table2":
-        lines += ["", f"The way of carrying with the least hours of 4v3 is that of `{best}`.", ""]
+        lines += ["", f"The way of carrying with the least mean of 4v3 hours is `{best}`.", ""]
         lines += _against_optimism(studies, best)
     return lines
 
 
 def _against_optimism(studies: Studies, study: str) -> Lines:
-    """Every row of a study against the best optimistic start."""
+    """Every row of a study against the best constant start."""
     found = beyond_optimism(studies, study)
     adjusted = [holm([three[k].p_value for three in found.values()]) for k in range(3)]
+    optimistic = studies["optimistic"]
     lines = [
-        f"Every row of `{study}` against the best optimistic start,"
-        f" {studies['optimistic'].best('target')}:",
+        f"Every row of `{study}` ({studies[study].origin}) against the best constant start,"
+        f" {optimistic.best('target')} ({optimistic.origin}):",
         "",
         "| episodes of 3v2 | 4v3 hours saved | p | | total hours saved | p | | longer at first (s)"
         " | p |",
@@ -222,16 +289,16 @@ def _against_optimism(studies: Studies, study: str) -> Lines:
     for i, (name, (target, total, start)) in enumerate(found.items()):
         p_target, p_total, p_start = (float(p[i]) for p in adjusted)
         lines.append(
-            f"| {name} | {spread(target)} | {p_target:.2g} | {verdict(target, p_target)}"
-            f" | {spread(total)} | {p_total:.2g} | {verdict(total, p_total)}"
-            f" | {spread(start)} | {p_start:.2g} |"
+            f"| {name} | {spread(target)} | {shown_p(p_target)} | {verdict(target, p_target)}"
+            f" | {spread(total)} | {shown_p(p_total)} | {verdict(total, p_total)}"
+            f" | {spread(start)} | {shown_p(p_start)} |"
         )
     return lines
 
 
 def _jumpstart(jumpstart: Evidence) -> Lines:
-    """The first episodes against each reference that needs no source."""
-    lines = _note(jumpstart)
+    """The first episodes against each reference that needs no source and has the same tiles."""
+    lines = note(jumpstart)
     for reference in jumpstart.study.references:
         if jumpstart.row(reference).stages:
             continue
@@ -248,54 +315,9 @@ def _jumpstart(jumpstart: Evidence) -> Lines:
 
 def _longer_at_first(jumpstart: Evidence, reference: str) -> Lines:
     return [
-        f"| {row.name} | {row.trials} | {spread(found.jumpstart)} | {found.jumpstart_holm:.2g} |"
+        f"| {row.name} | {row.trials} | {spread(found.jumpstart)}"
+        f" | {shown_p(found.jumpstart_holm)} |"
         for row in jumpstart.rows.values()
         if (found := row.against.get(reference)) is not None
+        and jumpstart.row(row.name).widths == jumpstart.row(reference).widths
     ]
-
-
-def _data(studies: Studies) -> Lines:
-    lines = ["| study | trials | seed | code | |", "|---|---|---|---|---|"]
-    for name, one in studies.items():
-        versions = ", ".join(sorted({record.code_version for record in one.results.records}))
-        lines.append(
-            f"| [`{name}`](../results/{name}/table.md) | {len(one.results.records)}"
-            f" | {one.study.seed} | {versions} | {one.results.note} |"
-        )
-    return [*lines, "", *_scratch_rows(studies)]
-
-
-def _scratch_rows(studies: Studies) -> Lines:
-    """By how much the scratch rows of studies differ from Table 2's."""
-    if (table2 := studies.get("table2")) is None:
-        return []
-    lines = [
-        "Rows from scratch that are to the same threshold, against Table 2's (hours of 4v3 more):",
-        "",
-    ]
-    for name, other in studies.items():
-        if other is table2 or not _same_goal(table2, other):
-            continue
-        found = scratch_difference(other, table2)
-        lines.append(f"- `{name}`: " + ("the same trials" if found is None else spread(found)))
-    return lines if len(lines) > 2 else []
-
-
-def _history(studies: Studies) -> Lines:
-    """What Table 2 was before the world's rules were mended."""
-    if (before := studies.get("table2_before")) is None:
-        return EARLIER_WORLD
-    return [
-        *EARLIER_WORLD,
-        "",
-        *_note(before),
-        *said_of(before, "target", "the time in 4v3"),
-        *said_of(before, "total", "the time in all"),
-        "",
-        *study_table(before, before.scratch, "episodes of 3v2"),
-    ]
-
-
-def _same_goal(one: Evidence, other: Evidence) -> bool:
-    names = "target", "threshold", "window", "max_hours"
-    return all(getattr(one.study, name) == getattr(other.study, name) for name in names)

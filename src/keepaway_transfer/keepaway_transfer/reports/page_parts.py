@@ -1,11 +1,12 @@
 """Pieces of the page of results: a study's table, what its verdicts say in a sentence, pictures."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from keepaway_transfer.reports.evidence import Evidence
-from keepaway_transfer.reports.report import spread
+from keepaway_transfer.reports.report import shown_p, spread
 from keepaway_transfer.reports.statistics import Comparison
 from keepaway_transfer.reports.summary import Against, RowSummary, verdict
 
@@ -13,13 +14,15 @@ ELSEWHERE_FILE = Path(__file__).with_name("elsewhere.json")
 
 Lines = list[str]
 
+AFTER_EPISODES = "after {} episodes of 3v2"
+"""What rows of Table 2 are, in a sentence."""
 WORDS = {
-    "saves": "saved by",
-    "costs": "made longer by",
-    "none": "the same with",
-    "open": "not decided for",
+    "saves": "shorter",
+    "costs": "longer",
+    "none": "the same (within an hour)",
+    "open": "not decided",
 }
-"""The words for rows by the first word of their verdicts."""
+"""What the target task's hours are, by the first word of a verdict."""
 
 
 def elsewhere() -> dict[str, Any]:
@@ -28,20 +31,37 @@ def elsewhere() -> dict[str, Any]:
     return data
 
 
-def said_of(one: Evidence, measure: str, what: str) -> Lines:
+def said_of(one: Evidence, measure: str, what: str, rows: str) -> Lines:
     """In a sentence which rows save, cost, or do neither against scratch.
 
     Args:
         one: a study.
         measure: "target" or "total".
         what: the hours are, "the time in 4v3".
+        rows: what their names are, "after {} episodes of 3v2".
+    """
+    verdicts = {
+        name: _verdict(found, measure)
+        for name, row in one.rows.items()
+        if (found := row.against.get(one.scratch)) is not None
+    }
+    if not verdicts:
+        return []
+    return [f"Against learning from scratch, {what} is {by_verdict(verdicts, rows)}."]
+
+
+def by_verdict(verdicts: Mapping[str, str], rows: str) -> str:
+    """Names of rows grouped by what was found of them, as a part of a sentence.
+
+    >>> by_verdict({"10": "open", "50": "saves", "100": "saves"}, "after {} episodes")
+    'shorter after 50 and 100 episodes; not decided after 10 episodes'
     """
     groups: dict[str, list[str]] = {word: [] for word in WORDS}
-    for name, row in one.rows.items():
-        if (found := row.against.get(one.scratch)) is not None:
-            groups[_verdict(found, measure).partition(":")[0]].append(name)
-    said = [f"{WORDS[word]} {listed(names)}" for word, names in groups.items() if names]
-    return [f"Against learning from scratch, {what} is {'; '.join(said)}."] if said else []
+    for name, found in verdicts.items():
+        groups[found.partition(":")[0]].append(name)
+    return "; ".join(
+        f"{WORDS[word]} {rows.format(listed(names))}" for word, names in groups.items() if names
+    )
 
 
 def _verdict(found: Against, measure: str) -> str:
@@ -49,7 +69,19 @@ def _verdict(found: Against, measure: str) -> str:
     return verdict(comparison, getattr(found, f"{measure}_holm"))
 
 
-def listed(names: list[str]) -> str:
+def less(saved: Comparison, unit: str = "h") -> str:
+    """Hours saved in words that fit their sign.
+
+    >>> less(Comparison(-2.0, -3.0, -1.0, 0.01))
+    '2.00 [1.00, 3.00] h more'
+    """
+    if saved.difference >= 0:
+        return f"{spread(saved)} {unit} less"
+    turned = Comparison(-saved.difference, -saved.high, -saved.low, saved.p_value)
+    return f"{spread(turned)} {unit} more"
+
+
+def listed(names: Sequence[str]) -> str:
     """Some names as part of a sentence."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
@@ -74,8 +106,9 @@ def _table_row(row: RowSummary, found: Against | None) -> str:
     if found is None:
         return line + " | | | | | |"
     return (
-        f"{line} {spread(found.target)} | {found.target_holm:.2g} | {_verdict(found, 'target')}"
-        f" | {spread(found.total)} | {found.total_holm:.2g} | {_verdict(found, 'total')} |"
+        f"{line} {spread(found.target)} | {shown_p(found.target_holm)}"
+        f" | {_verdict(found, 'target')} | {spread(found.total)} | {shown_p(found.total_holm)}"
+        f" | {_verdict(found, 'total')} |"
     )
 
 
@@ -93,3 +126,8 @@ def shown_picture(title: str, study: str, figure: str = "time_to_threshold") -> 
 def own_picture(title: str, figure: str) -> str:
     """A figure of the page itself."""
     return f"![{title}](results/{figure}.png)"
+
+
+def note(one: Evidence) -> Lines:
+    """What must be known of a study's trials, such as that they are of an earlier world."""
+    return [one.results.note, ""] if one.results.note else []

@@ -11,6 +11,7 @@ from keepaway_transfer.reports import plotting, statistics
 from keepaway_transfer.reports.statistics import Comparison, Interval
 from keepaway_transfer.reports.summary import (
     EQUIVALENT_HOURS,
+    Against,
     RowSummary,
     TrialMeasures,
     checked_threshold,
@@ -24,8 +25,10 @@ from keepaway_transfer.studies.records import Record
 from keepaway_transfer.studies.results import StudyResults
 from keepaway_transfer.studies.study import Row, Study
 
+RESOLVED_HOURS = 2.0  # the difference that rows of 100 trials were planned to show
 SHOWN_TRIALS = 5  # single learning curves a row, as in the paper's Figure 3
 CURVE_POINTS = 400
+SMALLEST_P = 1e-4  # that is shown
 
 
 def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
@@ -47,11 +50,11 @@ def table(study: Study, rows: Sequence[RowSummary], threshold: float) -> str:
         "",
         f"Hours to a mean duration of {threshold:g} s over {study.window:,} episodes of"
         f" {study.target}; trials that did not reach it within {study.max_hours:g} h count with"
-        " that time (restricted mean). In brackets: 95 % intervals (target hours from the"
-        " Kaplan-Meier curve, the others by bootstrap over trials). Level: what actions were worth"
-        " on average when the target task began. First episodes: the first"
+        " that time (restricted mean). In brackets: Student's intervals of 95 % over trials. Level:"
+        " what actions were worth on average when the target task began. First episodes: the first"
         f" {metrics.FIRST_EPISODES}. At the end: the last {study.window:,}, where trials do not"
-        " stop at the threshold.",
+        " stop at the threshold. Transfer ratio: of the total rewards up to the hour where the"
+        " shortest trial of the study ends, so it compares rows of one study alone.",
     ]
     for reference in study.references:
         if any(reference in row.against for row in rows):
@@ -102,18 +105,34 @@ def spread(estimate: Interval | Comparison) -> str:
     return f"{estimate[0]:.2f} [{estimate[1]:.2f}, {estimate[2]:.2f}]"
 
 
+def shown_p(p_value: float) -> str:
+    """A p-value for people, who need no more of a small one than that it is small.
+
+    >>> shown_p(0.0312), shown_p(3e-9)
+    ('0.031', '< 0.0001')
+    """
+    return "< 0.0001" if p_value < SMALLEST_P else f"{p_value:.2g}"
+
+
 def power(measures: Sequence[TrialMeasures], study: Study) -> str:
     """What the trials at hand could have shown, from the spread of the scratch row."""
-    hours = values([one for one in measures if one.row == study.references[0]], "target_hours")
+    scratch = [one for one in measures if one.row == study.references[0]]
+    hours = values(scratch, "target_hours")
+    if not any(one.reached for one in scratch):
+        return (
+            "No trial from scratch reached the threshold: nothing is known of what the trials show"
+            " in hours."
+        )
     if len(hours) < 2 or np.ptp(hours) == 0:
         return "The times from scratch have no spread: nothing is known of what the trials show."
     deviation = float(np.std(hours, ddof=1))
     seen = statistics.detectable_effect(len(hours), deviation)
-    needed = statistics.trials_needed(EQUIVALENT_HOURS, deviation)
+    needed = statistics.trials_needed(RESOLVED_HOURS, deviation)
     return (
         f"Power: the {len(hours)} times from scratch have a standard deviation of {deviation:.2f}"
         f" h; two independent rows of {len(hours)} trials show a difference of {seen:.1f} h with"
-        f" 80 % power at 5 %, and one of {EQUIVALENT_HOURS:g} h takes {needed} trials a row."
+        f" 80 % power at 5 % (before any adjustment), and one of {RESOLVED_HOURS:g} h takes"
+        f" {needed} trials a row."
     )
 
 
@@ -122,26 +141,39 @@ def _number(value: float, form: str) -> str:
 
 
 def _comparison_table(rows: Sequence[RowSummary], reference: str) -> list[str]:
-    lines = [
+    """Every row against a reference; hours only where half the trials of some row reached any."""
+    with_hours = any(2 * row.reached >= row.trials for row in rows)
+    hours = (
+        " target hours saved | p | p (log-rank) | | total hours saved | p | |" if with_hours else ""
+    )
+    return [
         f"Against row {reference} (p by the paired t-test where trials are pairs, else by Welch's;"
-        f" adjusted by Holm over the rows). `none` is said of intervals within {EQUIVALENT_HOURS:g}"
-        " h on both sides.",
+        " adjusted by Holm over the rows; intervals are not). `none` is said of intervals that"
+        f" hold zero and lie within {EQUIVALENT_HOURS:g} h on both sides.",
         "",
-        "| row | pairs | target hours saved | p | p (log-rank) | | total hours saved | p | "
-        "| longer at first (s) | p |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        f"| row | pairs |{hours} longer at first (s) | p |",
+        "|---|---|" + "---|" * hours.count("|") + "---|---|",
+        *(
+            _comparison_row(row.name, found, with_hours)
+            for row in rows
+            if (found := row.against.get(reference)) is not None
+        ),
     ]
-    for row in rows:
-        if (found := row.against.get(reference)) is not None:
-            lines.append(
-                f"| {row.name} | {found.pairs or '-'} | {spread(found.target)}"
-                f" | {found.target_holm:.2g} | {found.logrank_holm:.2g}"
-                f" | {verdict(found.target, found.target_holm)}"
-                f" | {spread(found.total)} | {found.total_holm:.2g}"
-                f" | {verdict(found.total, found.total_holm)}"
-                f" | {spread(found.jumpstart)} | {found.jumpstart_holm:.2g} |"
-            )
-    return lines
+
+
+def _comparison_row(name: str, found: Against, with_hours: bool) -> str:
+    cells = [name, f"{found.pairs or '-'}"]
+    if with_hours:
+        cells += [
+            spread(found.target),
+            shown_p(found.target_holm),
+            shown_p(found.logrank_holm),
+            verdict(found.target, found.target_holm),
+            spread(found.total),
+            shown_p(found.total_holm),
+            verdict(found.total, found.total_holm),
+        ]
+    return f"| {' | '.join([*cells, spread(found.jumpstart), shown_p(found.jumpstart_holm)])} |"
 
 
 def _made_by(results: StudyResults) -> str:

@@ -1,11 +1,12 @@
 """What a study's trials gave: every measure of every trial, and of every row with its interval.
 
 Times are simulated hours. A trial that did not reach the threshold within the study's limit counts
-with the limit: means of times are means restricted to it, and every row says how many reached it.
+with the limit. All such trials went on to it, so the mean of these times is the restricted mean;
+every row says how many reached the threshold.
 
 Rows are compared trial by trial where the study says that their trials are pairs
 (`Study.are_paired`), by the paired t-test; elsewhere by Welch's. A difference is called none only
-where its interval lies within EQUIVALENT_HOURS on both sides.
+where its interval holds zero and lies within EQUIVALENT_HOURS on both sides.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +23,9 @@ from keepaway_transfer.studies.records import Record
 from keepaway_transfer.studies.results import StudyResults
 from keepaway_transfer.studies.study import Study
 
-EQUIVALENT_HOURS = 2.0
-"""Differences that lie within this on both sides count as none: what rows of 100 can see."""
+EQUIVALENT_HOURS = 1.0
+"""Differences that lie within this on both sides count as none: a seventh of the least hours that a
+constant start takes, and less than rows of 100 trials can see from scratch."""
 
 SIGNIFICANT = 0.05
 
@@ -71,8 +73,8 @@ class RowSummary:
     reached: int
     source_hours: float  # mean
     start_level: float  # [s] mean over the trials; NaN if not known
-    target: Interval  # hours, restricted mean
-    total: Interval
+    target: Interval  # hours
+    total: Interval  # hours
     initial: Interval  # [s]
     asymptotic: Interval  # [s]
     greedy: Interval  # [s]
@@ -124,12 +126,8 @@ def summarise(study: Study, measures: Sequence[TrialMeasures]) -> list[RowSummar
     for reference in study.references:
         for name, comparison in _compare(study, by_row, reference).items():
             against[name][reference] = comparison
-    generator = np.random.default_rng(study.seed)
     scratch = float(np.mean(values(by_row[study.references[0]], "total_reward")))
-    return [
-        _summary(name, trials, study.max_hours, scratch, against[name], generator)
-        for name, trials in by_row.items()
-    ]
+    return [_summary(name, trials, scratch, against[name]) for name, trials in by_row.items()]
 
 
 def compare(
@@ -157,15 +155,17 @@ def verdict(comparison: Comparison, p_value: float, margin: float = EQUIVALENT_H
 
     >>> verdict(Comparison(3.0, 1.0, 5.0, 0.01), 0.02)
     'saves'
-    >>> verdict(Comparison(-0.1, -1.5, 1.3, 0.9), 0.9)
-    'none: within 1.5 h'
-    >>> verdict(Comparison(1.1, -0.5, 2.7, 0.2), 0.4)
+    >>> verdict(Comparison(-0.1, -0.8, 0.6, 0.8), 0.9)
+    'none: within 0.8 h'
+    >>> verdict(Comparison(0.5, 0.1, 0.9, 0.02), 0.08)
     'open'
     """
     if p_value < SIGNIFICANT:
         return "saves" if comparison.difference > 0 else "costs"
     furthest = max(abs(comparison.low), abs(comparison.high))
-    return f"none: within {furthest:.1f} h" if furthest <= margin else "open"
+    if comparison.low <= 0 <= comparison.high and furthest <= margin:
+        return f"none: within {furthest:.1f} h"
+    return "open"
 
 
 def seconds(cycles: Sequence[int]) -> metrics.Floats:
@@ -212,14 +212,15 @@ def _measures(
     record: Record, study: Study, threshold: float, horizon: float, goes_on: bool
 ) -> TrialMeasures:
     crossing = crossing_of(record, study, threshold)
-    target_hours = min(crossing.hours, study.max_hours)
+    reached = crossing.reached and crossing.hours <= study.max_hours
+    target_hours = crossing.hours if reached else study.max_hours
     return TrialMeasures(
         row=record.row,
         trial=record.number,
         source_episodes=record.source_episodes,
         source_hours=record.source_hours,
         start_level=_known(record.start_level),
-        reached=crossing.reached and crossing.hours <= study.max_hours,
+        reached=reached,
         target_episodes=crossing.episodes,
         target_hours=target_hours,
         total_hours=record.source_hours + target_hours,
@@ -295,25 +296,19 @@ def _logrank(base: list[TrialMeasures], other: list[TrialMeasures]) -> float:
 
 
 def _summary(
-    name: str,
-    trials: list[TrialMeasures],
-    limit: float,
-    scratch_reward: float,
-    against: dict[str, Against],
-    generator: np.random.Generator,
+    name: str, trials: list[TrialMeasures], scratch_reward: float, against: dict[str, Against]
 ) -> RowSummary:
     def mean(measure: str) -> Interval:
-        return statistics.bootstrap_mean(values(trials, measure), generator)
+        return statistics.mean_interval(values(trials, measure))
 
-    reached = [one.reached for one in trials]
     rewards = float(np.mean(values(trials, "total_reward")))
     return RowSummary(
         name=name,
         trials=len(trials),
-        reached=sum(reached),
+        reached=sum(one.reached for one in trials),
         source_hours=float(np.mean(values(trials, "source_hours"))),
         start_level=float(np.mean(values(trials, "start_level"))),
-        target=statistics.restricted_mean(values(trials, "target_hours"), reached, limit),
+        target=mean("target_hours"),
         total=mean("total_hours"),
         initial=mean("initial_performance"),
         asymptotic=mean("asymptotic_performance"),
