@@ -13,7 +13,10 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+import domain_coordinator
 import rclpy
 from rclpy.experimental import EventsExecutor
 
@@ -30,8 +33,24 @@ AGENT = "agent"
 def main() -> int:
     """Test it, and say what was found."""
     args = parse()
-    if args.domain is not None:
-        os.environ["ROS_DOMAIN_ID"] = str(args.domain)
+    with own_domain(args.domain) as domain:
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        return check(args)
+
+
+@contextmanager
+def own_domain(asked: int | None) -> Iterator[int]:
+    """The domain that was asked for, here or in the environment, or one that no other check has."""
+    given = os.environ.get("ROS_DOMAIN_ID", "") if asked is None else str(asked)
+    if given.isdecimal():
+        yield int(given)
+    else:
+        with domain_coordinator.domain_id() as domain:
+            yield domain
+
+
+def check(args: argparse.Namespace) -> int:
+    """Test it in the domain of the environment."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     rclpy.init(args=[])
     executor = EventsExecutor()
@@ -81,7 +100,7 @@ def parse() -> argparse.Namespace:
     add("--one-size", action="store_true", help="no match of another size, for a learner of 3v2")
     add("--answer-timeout", type=float, default=2.0, help="for an answer [s] (default 2)")
     add("--end-timeout", type=float, default=5.0, help="to end after SIGTERM [s] (default 5)")
-    add("--domain", type=int, help="ROS domain (default: that of the environment)")
+    add("--domain", type=int, help="ROS domain (default: ROS_DOMAIN_ID, or one that is free)")
     add("--json", action="store_true", help="end with one JSON object")
     return parser.parse_args()
 

@@ -1,10 +1,12 @@
 """scripts/check_agent.py as a person runs it: built-in players pass, one that misbehaves fails."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from graph import Graph
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "src" / "keepaway_agent" / "examples"
@@ -99,3 +101,33 @@ def test_a_command_that_there_is_not_is_refused_in_a_line() -> None:
     assert checked.returncode == 2
     assert "no_such_agent" in checked.stderr
     assert "Traceback" not in checked.stderr
+
+
+def test_what_a_match_in_the_same_domain_is_answered_is_not_held_against_an_agent(
+    graph: Graph,
+) -> None:
+    graph.start_simulator(task="4v3")
+    command = [sys.executable, str(ROOT / "scripts" / "check_agent.py"), "--"]
+    checked = subprocess.Popen(
+        [*command, str(EXAMPLES / "smallest_agent.py")], stderr=subprocess.PIPE, text=True
+    )
+    graph.spin_until(lambda: checked.poll() is not None)
+    _, said = checked.communicate()
+    assert checked.returncode == 2
+    assert "another simulator publishes `match` here (4v3)" in said
+    assert "Traceback" not in said
+
+
+def test_two_checks_at_once_do_not_hear_each_other() -> None:
+    alone = {name: value for name, value in os.environ.items() if name != "ROS_DOMAIN_ID"}
+    command = [sys.executable, str(ROOT / "scripts" / "check_agent.py"), "--answer-timeout", "20"]
+    both = [
+        subprocess.Popen(
+            [*command, "--", str(EXAMPLES / "smallest_agent.py")],
+            stdout=subprocess.PIPE, text=True, env=alone,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    for each in both:
+        said, _ = each.communicate(timeout=900)
+        assert said.endswith("14 of 14 sentences hold\n"), said

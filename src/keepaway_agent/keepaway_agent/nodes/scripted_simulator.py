@@ -3,6 +3,7 @@
 It has the simulator's name and topics, and imports nothing of it.
 """
 
+import secrets
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -14,7 +15,9 @@ from rosgraph_msgs.msg import Clock
 
 from keepaway_agent.checks import conformance
 from keepaway_agent.checks.conformance import Exchange, Garbage, Pause, Request, Shown, Step
+from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.qos import ANSWERS, STATUSES
+from keepaway_agent.texts import one_line
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 
 RESEND_PERIOD = 0.25  # [s] an unanswered perception is sent again, as the simulator does
@@ -37,6 +40,7 @@ class ScriptedSimulator(Node):
         super().__init__("simulator", **node_options)
         self.log: list[Exchange] = []
         self._name, self._ready_as, self._said_at = name, -1, 0.0
+        self._match_id, self._others_match = secrets.randbelow(2**63 - 1) + 1, ""
         self._match = self.create_publisher(Match, "match", STATUSES)
         self._simulated_time = self.create_publisher(Clock, "/clock", ANSWERS)
         self._perception = self.create_publisher(Perception, f"{name}/perception", ANSWERS)
@@ -44,6 +48,7 @@ class ScriptedSimulator(Node):
             ActionRequest, f"{name}/action_request", self._on_request, ANSWERS, raw=True
         )
         self.create_subscription(AgentStatus, f"{name}/status", self._on_status, STATUSES)
+        self.create_subscription(Match, "match", self._on_match, STATUSES)
 
     def perform(
         self, steps: Iterable[Step], spin: Spin, is_there: Callable[[], bool], patience: float
@@ -55,6 +60,9 @@ class ScriptedSimulator(Node):
             spin: handles what has come.
             is_there: whether the agent's process still runs; one that ended is not waited for.
             patience: for an answer [s].
+
+        Raises:
+            AgentError: another simulator talks to the agent's topics, too.
         """
         self._spin, self._is_there, self._patience = spin, is_there, patience
         for step in steps:
@@ -71,7 +79,7 @@ class ScriptedSimulator(Node):
 
     def _announce(self, match: conformance.ScriptedMatch) -> None:
         self._ready_as = -1
-        self._match.publish(match_message(match))
+        self._match.publish(match_message(match, self._match_id))
         index = match.player_names.index(self._name)
         exchange = self.log[-1]
         self._listen(READY_PATIENCE, lambda: self._ready_as == index)
@@ -96,6 +104,11 @@ class ScriptedSimulator(Node):
         until = time.monotonic() + seconds
         while not is_done() and self._is_there() and (left := until - time.monotonic()) > 0:
             self._spin(min(left, 0.1))
+            if self._others_match:
+                raise AgentError(
+                    f"another simulator publishes `match` here ({self._others_match}): what the"
+                    " agent answers may be meant for it; choose another domain, or end the other"
+                )
 
     def _on_request(self, data: bytes) -> None:
         if not self.log:
@@ -108,14 +121,19 @@ class ScriptedSimulator(Node):
         if shown.due and (request.episode, request.cycle) == shown.moment:
             exchange.answer_time = time.monotonic() - self._said_at
 
+    def _on_match(self, match: Match) -> None:
+        if match.match_id != self._match_id:
+            self._others_match = one_line(match.task)
+
     def _on_status(self, status: AgentStatus) -> None:
         if status.ready and status.name == self._name:
             self._ready_as = status.player_index
 
 
-def match_message(match: conformance.ScriptedMatch) -> Match:
+def match_message(match: conformance.ScriptedMatch, match_id: int) -> Match:
     """What is played, as a message."""
     return Match(
+        match_id=match_id,
         task=f"{match.num_keepers}v{match.num_takers}",
         profile="2005",
         num_keepers=match.num_keepers,
