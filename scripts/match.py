@@ -6,8 +6,9 @@
     .venv/bin/python scripts/match.py --episodes 20 --keeper-agent "python my_keeper.py"
     .venv/bin/python scripts/match.py --episodes 20 --agent keeper_2=my_keeper.py
 
-Ctrl-C ends it with weights and bag whole. Give a second match on this machine another --domain or
---namespace. With --json the last line of the output is one JSON object.
+Ctrl-C ends it with weights and bag whole. A player that fails is named, and the code at the end is
+1. Give a second match on this machine another --domain or --namespace. With --json the last line of
+the output is one JSON object.
 """
 
 import argparse
@@ -87,7 +88,7 @@ def main() -> int:
         check_files(args)
         args.match_id = random_match_id()
         play = play_in_one_process if args.single_process else play_in_processes
-        board = play(args, members(args, task), signals)
+        board, failed = play(args, members(args, task), signals)
     except (AgentError, KeepawayError, MatchError, OSError) as error:
         print(f"match: {error}", file=sys.stderr)
         return 1
@@ -99,7 +100,9 @@ def main() -> int:
     board.conclude()
     report(args, board.summary())
     ignore_signals(SIGNALS)
-    return 128 + signals[0] if signals else 0  # as shells expect it: 130 after Ctrl-C
+    if signals:
+        return 128 + signals[0]  # as shells expect it: 130 after Ctrl-C
+    return 1 if failed else 0
 
 
 def seat_agents(args: argparse.Namespace, task: Task) -> None:
@@ -225,8 +228,8 @@ def begin_ros(args: argparse.Namespace) -> tuple[Scoreboard, Executor]:
 
 def play_in_one_process(
     args: argparse.Namespace, team: list[Member], signals: list[int]
-) -> Scoreboard:
-    """All nodes here, taking turns."""
+) -> tuple[Scoreboard, list[str]]:
+    """All nodes here, taking turns; nobody fails alone."""
     board, executor = begin_ros(args)
     options = [{"cli_args": each.arguments, "use_global_arguments": False} for each in team]
     referee = Simulator(**options[0])
@@ -247,13 +250,14 @@ def play_in_one_process(
         referee.close()
         for player in players:
             player.save()
-    return board
+    return board, []
 
 
 def play_in_processes(
     args: argparse.Namespace, team: list[Member], signals: list[int]
-) -> Scoreboard:
-    """Every node its own process; ends when the simulator's does."""
+) -> tuple[Scoreboard, list[str]]:
+    """Every node its own process; ends when the simulator's does. Players that failed are named."""
+    failed = []
     with Processes(os.environ) as processes:
         commands = {each.name: [*each.program, *each.arguments] for each in team}
         is_counted = start(team, processes)
@@ -266,6 +270,7 @@ def play_in_processes(
             board.show()
             for name, code in processes.ended():
                 judge_end(name, code, board, args.restart)
+                failed += [name] * (code > 0)
                 if args.restart and code < 0:
                     hear_all(executor)
                     processes.start(name, [*commands[name], *going_on(args, name, board)])
@@ -277,7 +282,7 @@ def play_in_processes(
         for name in processes.stop(processes.names, END_TIMEOUT):
             print(f"match: {name} did not end and was killed", file=sys.stderr)
     hear_all(executor)
-    return board
+    return board, failed
 
 
 def start(team: list[Member], processes: Processes) -> Event:

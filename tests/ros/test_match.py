@@ -177,6 +177,17 @@ def test_an_agent_of_ones_own_plays_with_ordinary_messages() -> None:
     assert episodes(summary) == played(trained(2, policy="hold"))
 
 
+def test_a_match_that_went_on_without_an_agent_that_failed_ends_with_code_1(tmp_path: Path) -> None:
+    text = (Path(__file__).with_name("plain_keeper.py")).read_text(encoding="utf-8")
+    failing = tmp_path / "failing.py"
+    failing.write_text(text.replace("ActionRequest.HOLD_BALL", "ActionRequest.NO_SUCH_ACTION"))
+    match = start("--episodes", "2", "--agent", f"keeper_1={failing}", "--answer-timeout", "1")
+    summary, err = finish(match)
+    assert match.returncode == 1
+    assert len(episodes(summary)) == 2
+    assert "keeper_1 ended with code 1; the match continues without it" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
