@@ -1,16 +1,18 @@
-"""Tables and figures of a study's results, of a recorded match, or of a soccer server's log.
+"""Tables and figures of a study's results, of trainings, of a recorded match, or of a server's log.
 
     .venv/bin/python scripts/analyze.py results/table2
     .venv/bin/python scripts/analyze.py results/table2 --threshold 8 --out results/table2-at-8
     .venv/bin/python scripts/analyze.py results/table2 --beside results/variants_1000
     .venv/bin/python scripts/analyze.py src/keepaway_transfer/results --page
+    .venv/bin/python scripts/analyze.py out/4v3_scratch out/4v3_transfer
     .venv/bin/python scripts/analyze.py out/bag
     .venv/bin/python scripts/analyze.py first.kwy second.kwy --threshold 9
 
-The report is written beside the results if no other folder is named; a bag's to BAG/analysis. Of a
-bag it has a line for every episode (CSV and Parquet), hold times, passes, losses and actions. With
---beside it says by how much two studies' rows from scratch differ; --page makes the report of every
-study in a folder, and the page of what they show.
+The report is written beside the results if no other folder is named; a bag's to BAG/analysis, that
+of trainings of one task, their learning curves in one figure, to the first of them. Of a bag it has
+a line for every episode (CSV and Parquet), hold times, passes, losses and actions. With --beside it
+says by how much two studies' rows from scratch differ; --page makes the report of every study in a
+folder, and the page of what they show.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from keepaway_agent.errors import AgentError
 from keepaway_sim.bags.reader import is_bag
 from keepaway_sim.errors import KeepawayError
 from keepaway_transfer import metrics
@@ -31,6 +34,9 @@ from keepaway_transfer.errors import LogError, TransferError
 if TYPE_CHECKING:
     from keepaway_transfer.reports.kwy import KeepawayLog
 
+TRAINING_FILE = (
+    "training.json"  # scripts/train.py writes it; what reads it takes a second to import
+)
 PAGE = Path("src/keepaway_transfer/docs/results.md")
 
 
@@ -42,13 +48,17 @@ def main() -> int:
         if all(path.suffix == ".kwy" for path in arguments.results):
             print(_logs_line(arguments.results, arguments.threshold or 9.0, arguments.window))
             return 0
+        if all((path / TRAINING_FILE).is_file() for path in arguments.results):
+            return _analyse_trainings(arguments.results, arguments.out)
         if len(arguments.results) > 1:
-            raise KeepawayError("name one folder or bag, or several .kwy logs of one training")
+            raise KeepawayError(
+                "name one study or bag, or several trainings, or several .kwy logs of one training"
+            )
         path = arguments.results[0]
         if is_bag(path) or path.is_file():
             return _analyse_bag(path, arguments.out, arguments.match)
         return _analyse_study(path, arguments)
-    except (TransferError, KeepawayError, FileNotFoundError) as error:
+    except (AgentError, TransferError, KeepawayError, FileNotFoundError) as error:
         print(f"analyze: {error}", file=sys.stderr)
         return 1
 
@@ -59,6 +69,15 @@ def _analyse_bag(bag: Path, out: Path | None, number: int | None) -> int:
     out = out or (bag if bag.is_dir() else bag.parent) / "analysis"
     print(analyse(bag, out, number))
     print(f"Written to {out}: episodes.csv and .parquet, summary.json and four figures.")
+    return 0
+
+
+def _analyse_trainings(folders: list[Path], out: Path | None) -> int:
+    from keepaway_transfer.reports.trainings import write_trainings
+
+    out = out or folders[0]
+    print(write_trainings(folders, out))
+    print(f"Written to {out}: learning_curves.png.")
     return 0
 
 
@@ -149,7 +168,8 @@ def _parse() -> argparse.Namespace:
         "results",
         type=Path,
         nargs="+",
-        help="folder of scripts/study.py, a bag, or .kwy logs of one training in their order",
+        help="folder of scripts/study.py, folders of scripts/train.py, a bag, or .kwy logs of one"
+        " training in their order",
     )
     parser.add_argument("--threshold", type=float, help="mean duration [s]; default the study's")
     parser.add_argument("--window", type=int, default=metrics.WINDOW, help="episodes; for a log")

@@ -36,7 +36,6 @@ from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.task import Task
 from keepaway_sim.version import code_version
-from keepaway_transfer import metrics
 from keepaway_transfer.rho import Transfer, transferred
 from keepaway_transfer.studies.processes import WorkerExecutor
 
@@ -44,6 +43,7 @@ SCRIPTS = Path(__file__).resolve().parent
 DOMAIN = 97  # the demo's own, unless one is set: it receives no other match
 THRESHOLD = 9.0  # [s] the paper's for 4v3
 OPTIMISTIC = "optimistic@5"  # the control: every action worth 5 s, nothing learned before
+WINDOW = 200  # episodes that a point of a learning curve is the mean of
 CYCLES_PER_HOUR = 36000
 PROGRESS_EVERY = 10.0  # [s]
 MARK = "made_by_the_demo.txt"  # what an earlier demo made is replaced only beside this file
@@ -267,16 +267,10 @@ def learn_4v3(args: Args, starts: Sequence[np.ndarray | None], label: str) -> li
 
 def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
     """Draw the learning curves."""
-    from keepaway_transfer.reports import plotting
-    from keepaway_transfer.reports.statistics import mean_curve
+    from keepaway_transfer.reports import plotting, trainings
 
-    hours = np.linspace(0.1, args.target_hours * 0.98, 60)
-    curves = {}
-    for label, trials in groups.items():
-        each = np.array([metrics.learning_curve(t, hours, window=200, least=20) for t in trials])
-        curves[label] = plotting.CurveGroup(each, mean_curve(each))
-    title = f"4v3, mean of 200 episodes, {args.trials} trials"
-    figure = plotting.learning_curves(hours, curves, THRESHOLD, title)
+    title = f"4v3, mean of {WINDOW} episodes, {args.trials} trials"
+    figure = trainings.curves(groups, WINDOW, title=title, threshold=THRESHOLD)
     path = args.out / "learning_curves.png"
     plotting.save_figure(figure, path, f"scripts/demo.py --seed {args.seed}, {code_version()}")
     return path
@@ -297,9 +291,9 @@ def table(
     for summary, label in ((learned, "3v2 nodes, learning"), (moved, "4v3 nodes, after transfer")):
         add(f"{label}, {summary['episodes']} episodes", summary["mean_duration_s"], None)
     for label, trials in groups.items():
-        for part, episodes in (("first", slice(0, 200)), ("last", slice(-200, None))):
+        for part, episodes in (("first", slice(0, WINDOW)), ("last", slice(-WINDOW, None))):
             means = [durations[episodes].mean() for durations in trials]
-            add(f"4v3 {label}, {part} 200 episodes", *mean_and_error(means))
+            add(f"4v3 {label}, {part} {WINDOW} episodes", *mean_and_error(means))
     return "\n".join(rows)
 
 

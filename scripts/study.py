@@ -18,13 +18,12 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 import attrs
-from tqdm import tqdm
 
 from keepaway_agent.errors import AgentError
 from keepaway_sim.cli.interrupts import Interruption, Stopped
+from keepaway_sim.cli.progress import ProgressBar
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.version import code_version
 from keepaway_transfer.errors import StudyError
@@ -33,10 +32,6 @@ from keepaway_transfer.studies.experiment import StudyProgress, run
 from keepaway_transfer.studies.processes import WorkerExecutor
 from keepaway_transfer.studies.results import open_results, pack
 from keepaway_transfer.studies.study import Study, load_study
-
-log = logging.getLogger("study")
-
-BAR = "{percentage:3.0f}% {bar} {desc}"
 
 
 def main() -> int:
@@ -70,26 +65,18 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
         _executor(arguments) as executor,
     ):
         progress = StudyProgress(study, results.done)
-        with tqdm(
-            total=progress.trials, initial=progress.done, disable=None, bar_format=BAR
+        with ProgressBar(
+            "study", progress.trials, "trials", done=progress.done, period=0, estimates=False
         ) as bar:
-            _show(progress, bar)
+            bar.show(progress.done, str(progress))
             for trials in run(
                 study, results, executor, play_batch, arguments.batch, interruption.shield
             ):
                 progress.add(trials)
-                bar.update(len(trials))
-                _show(progress, bar)
+                bar.show(progress.done, str(progress))
     pack(arguments.out)
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
     return 0
-
-
-def _show(progress: StudyProgress, bar: "tqdm[NoReturn]") -> None:
-    """In the bar, or as a line where the output is no terminal."""
-    bar.set_description_str(str(progress))
-    if bar.disable:
-        log.info("%s", progress)
 
 
 @contextmanager

@@ -35,6 +35,7 @@ from keepaway_agent.training.trial_recorder import TrialRecorder
 from keepaway_agent.training.workers import NUM_FIELDS, play_trials
 from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import add_options, chosen, numbers_in
+from keepaway_sim.cli.progress import ProgressBar
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.match.scores import Score, summary
 from keepaway_sim.task import Outcome
@@ -130,12 +131,11 @@ def train(
     """
     meter, played, code = Meter(len(numbers)), Progress(), 0
     total = len(numbers) * training.episodes
-    with tqdm(total=total, disable=None, unit=" episodes", smoothing=0.05) as bar:
+    with ProgressBar("train", total, "episodes") as bar:
 
         def watch(progress: Progress) -> None:
             meter.read(progress)
-            bar.update(progress.episodes - bar.n)
-            bar.set_postfix_str(str(meter))
+            bar.show(progress.episodes, str(meter))
 
         try:
             spread = arguments.processes, arguments.fields
@@ -198,6 +198,7 @@ def report(
     numbers: dict[str, Any] = {
         "task": training.task,
         **summary(scores),
+        "last_episodes": min([LAST, *(len(each) for each, _ in episodes.values())]),
         "last_mean_duration_s": float(np.mean(ends)) if ends else None,
         "trials": len(episodes),
         "simulated_hours": sum(score.duration for score in scores) / 3600,
@@ -237,7 +238,8 @@ def in_words(training: Training, numbers: dict[str, Any]) -> str:
         f" {numbers['episodes']:,} episodes in {trials} trials,"
         f" {numbers['simulated_hours']:.1f} simulated hours\n"
         f"mean hold time {numbers['mean_duration_s']:.2f} s{spread},"
-        f" last {LAST} episodes of a trial {numbers['last_mean_duration_s']:.2f} s,"
+        f" last {numbers['last_episodes']:,} episodes of a trial"
+        f" {numbers['last_mean_duration_s']:.2f} s,"
         f" out of bounds {numbers['out_of_bounds_share']:.0%}"
         + (f"\n{rate:,.0f} cycles a second" if rate else "")
         + (f"\nweights' SHA-256 {sha256}" if sha256 else "")

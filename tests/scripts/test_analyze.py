@@ -89,3 +89,12 @@ def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
     assert done.returncode == 1
     assert done.stderr.startswith("analyze: ")
     assert done.stderr.count("\n") == 1
+
+
+def test_trainings_get_their_learning_curves(tmp_path):
+    train = [sys.executable, SCRIPT.with_name("train.py"), "--policy", "hold", "--episodes", "30"]
+    subprocess.run([*train, "--save-weights", tmp_path / "hold"], check=True)
+    done = analyze(tmp_path / "hold")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "| training | trials | episodes | hours |" in done.stdout
+    assert (tmp_path / "hold" / "learning_curves.png").is_file()

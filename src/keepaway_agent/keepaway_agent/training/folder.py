@@ -10,7 +10,7 @@ import logging
 import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -123,14 +123,7 @@ class TrainingFolder:
         Raises:
             AgentError: the file was changed by something else.
         """
-        path = self._folder(number) / "episodes.csv"
-        try:
-            rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()[1:]]
-            durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
-            outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
-        except (OSError, ValueError, KeyError, OverflowError) as error:
-            raise AgentError(f"{path}: not a trial's episodes: {error!r}") from error
-        return durations, outcomes
+        return _read_episodes(self._folder(number) / "episodes.csv")
 
     def weights_hash(self, numbers: Iterable[int]) -> str:
         """SHA-256 of every weight that the players of these trials have learned, in order.
@@ -176,6 +169,51 @@ class TrainingFolder:
             )
 
 
+class TrainingRecord(NamedTuple):
+    """A training's folder that was read."""
+
+    settings: Training
+    code_version: str  # that it was begun with
+    command: str
+    episodes: dict[int, tuple[np.ndarray, np.ndarray]]  # durations [cycles], outcomes by trial
+
+
+def read_training(path: Path) -> TrainingRecord:
+    """Read a training's settings and the episodes of all its finished trials.
+
+    Raises:
+        AgentError: no training's folder, or one that something else has changed.
+    """
+    settings, record = _read_record(path)
+    trials = sorted(path.glob("trial_[0-9]*"))
+    episodes = {int(trial.name[6:]): _read_episodes(trial / "episodes.csv") for trial in trials}
+    return TrainingRecord(settings, record["code_version"], record.get("command", ""), episodes)
+
+
+def _read_episodes(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()[1:]]
+        durations = np.array([int(cycles) for _, cycles, _ in rows], dtype=np.int32)
+        outcomes = np.array([Outcome[name.upper()] for *_, name in rows], dtype=np.int8)
+    except (OSError, ValueError, KeyError, OverflowError) as error:
+        raise AgentError(f"{path}: not a trial's episodes: {error!r}") from error
+    return durations, outcomes
+
+
+def _read_record(path: Path) -> tuple[Training, dict[str, Any]]:
+    """What `training.json` says."""
+    file = path / "training.json"
+    try:
+        record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        settings = build(Training, record["settings"])
+        record["code_version"] = str(record["code_version"])
+    except OSError as error:
+        raise AgentError(f"{file} cannot be read: {error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise AgentError(f"{file} is no training's: {error!r}") from error
+    return settings, record
+
+
 def _episodes_text(result: TrialResult) -> str:
     names = [Outcome(code).name.lower() for code in result.outcomes]
     rows = zip(result.durations, names, strict=True)
@@ -185,18 +223,15 @@ def _episodes_text(result: TrialResult) -> str:
 
 def _check_same(path: Path, record: dict[str, Any], any_code: bool) -> None:
     """Refuse to mix results of different settings or versions."""
-    try:
-        there = json.loads((path / "training.json").read_text(encoding="utf-8"))
-        settings = flat(build(Training, there["settings"]))
-        version = there["code_version"]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise AgentError(f"{path / 'training.json'} is no training's: {error!r}") from error
+    settings, there = _read_record(path)
+    before = flat(settings)
     for name, value in record["settings"].items():
-        if settings.get(name) != value:
+        if before.get(name) != value:
             raise AgentError(
-                f"{path} holds a training with {name}={settings.get(name)!r}, not {value!r}:"
+                f"{path} holds a training with {name}={before.get(name)!r}, not {value!r}:"
                 " use the same settings, or name another folder"
             )
+    version = there["code_version"]
     if version != record["code_version"] and not any_code:
         raise AgentError(
             f"{path} was begun by version {version}, this is {record['code_version']}:"

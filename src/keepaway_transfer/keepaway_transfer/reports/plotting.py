@@ -35,14 +35,14 @@ class CurveGroup(NamedTuple):
 
 
 def learning_curves(
-    hours: Floats, groups: Mapping[str, CurveGroup], threshold: float, title: str
+    hours: Floats, groups: Mapping[str, CurveGroup], threshold: float | None, title: str
 ) -> Figure:
     """Figure 3 of the paper: single trials and their mean with its interval, one colour a group.
 
     Args:
         hours: (num_points,) simulated hours of training.
         groups: label -> curves; the first is drawn grey and dotted, as learning from scratch.
-        threshold: of the mean duration, a dashed line [s].
+        threshold: of the mean duration, a dashed line [s]; None draws none.
         title: above the axes.
     """
     figure, axes = _figure(title, "Training time (simulated hours)", "Episode duration (s)")
@@ -53,11 +53,12 @@ def learning_curves(
         axes.fill_between(
             hours, group.mean.low, group.mean.high, color=colour, alpha=BAND, linewidth=0
         )
-    axes.axhline(threshold, color="black", linestyle="--", linewidth=0.8)
-    axes.annotate(
-        f"threshold {threshold:g} s", (0, threshold), xytext=(4, 3), textcoords="offset points",
-        fontsize=8,
-    )  # fmt: skip
+    if threshold is not None:
+        axes.axhline(threshold, color="black", linestyle="--", linewidth=0.8)
+        axes.annotate(
+            f"threshold {threshold:g} s", (1, threshold), xycoords=("axes fraction", "data"),
+            xytext=(-4, 3), textcoords="offset points", fontsize=8, ha="right",
+        )  # fmt: skip
     axes.set_xlim(left=0)
     axes.legend(edgecolor="none", loc="best")  # its white ground keeps lines from the words
     return figure

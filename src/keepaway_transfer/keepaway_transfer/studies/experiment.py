@@ -122,7 +122,7 @@ class StudyProgress:
     def __str__(self) -> str:
         minutes = self.seconds_left / 60
         left = "unknown" if minutes == float("inf") else f"{minutes:.0f} min"
-        return f"{self.done}/{self.trials} trials, time left {left}"
+        return f"time left {left}"
 
 
 def _far_apart(names: Sequence[str]) -> list[str]:
