@@ -92,8 +92,9 @@ def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
 
 
 def test_trainings_get_their_learning_curves(tmp_path):
-    train = [sys.executable, SCRIPT.with_name("train.py"), "--policy", "hold", "--episodes", "30"]
-    subprocess.run([*train, "--save-weights", tmp_path / "hold"], check=True)
+    train = [sys.executable, str(SCRIPT.with_name("train.py")), "--policy", "hold"]
+    options = ["--episodes", "30", "--save-weights", str(tmp_path / "hold")]
+    subprocess.run([*train, *options], check=True)
     done = analyze(tmp_path / "hold")
     assert (done.returncode, done.stderr) == (0, "")
     assert "| training | trials | episodes | hours |" in done.stdout

@@ -1,5 +1,9 @@
 """Gymnasium's and PettingZoo's environments: their own tests, and the trainer's episodes."""
 
+import re
+from itertools import groupby
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ from keepaway_agent.environments import keepaway_v0
 from keepaway_agent.environments.aec import KeepawayAECEnv
 from keepaway_agent.environments.gym import KeeperEnv, KeeperVectorEnv
 from keepaway_agent.errors import AgentError
+from keepaway_agent.learning.features import keeper_features
 from keepaway_agent.training.trainer import Trainer
 from keepaway_agent.training.trial import StopRule, TrainerConfig, Trial, trial_seed
 from keepaway_sim.task import Task
@@ -110,6 +115,34 @@ def test_it_is_made_by_its_name_alone_and_by_the_dozen() -> None:
     env = gymnasium.make("Keepaway-v0", task="4v3", disable_env_checker=True)
     assert env.observation_space.shape == (19,)
     assert gymnasium.make_vec("Keepaway-v0", num_envs=12).action_space.shape == (12,)
+
+
+def test_an_observations_entries_have_names_and_infos_are_those_of_the_page() -> None:
+    page = Path(__file__).parents[3] / "src/keepaway_agent/docs/environments.md"
+    rows = re.findall(r"^\| ?(\w*) \| `(\w+)` \|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    told = {name for form, name in rows if form in ("Gymnasium", "")}
+    env = gymnasium.make("keepaway_agent.environments:Keepaway-v0", task="4v3")
+    observation, info = env.reset(seed=1)
+    assert set(info) == told
+    keeper = env.unwrapped
+    assert isinstance(keeper, KeeperEnv)
+    assert len(keeper.variables) == len(observation) == 19
+    assert keeper.variables[:2] == ("dist_k1_c", "dist_k1_k2")
+    many = KeeperVectorEnv(2, task="4v3")
+    assert many.variables == keeper.variables
+    turns = KeepawayAECEnv(teams="both", task="4v3")
+    assert turns.variables("keeper_2") == many.variables
+    assert turns.variables("taker_1")[0] == "dist_t1_b"
+    with pytest.raises(AgentError, match="the agents are keeper_1"):
+        turns.variables("nobody")
+
+
+def test_the_packages_readme_has_a_keepers_variables_in_their_order() -> None:
+    page = Path(__file__).parents[3] / "src/keepaway_agent/README.md"
+    table = page.read_text(encoding="utf-8").split("| variables of a keeper K1")[1].split("\n\n")[0]
+    groups = groupby(keeper_features(4, 3), key=lambda each: each.kind)
+    firsts = [next(each).name for _, each in groups]
+    assert re.findall(r"^\| `(\w+)`", table, re.MULTILINE) == firsts
 
 
 def test_settings_that_make_no_game_are_refused() -> None:

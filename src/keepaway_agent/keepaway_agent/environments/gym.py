@@ -39,7 +39,7 @@ from keepaway_agent.environments.refusals import (
     checked_seed,
 )
 from keepaway_agent.environments.snapshots import KeeperState, require_kind, with_new_luck
-from keepaway_agent.environments.spaces import observation_space
+from keepaway_agent.environments.spaces import observation_space, variable_names
 from keepaway_agent.errors import AgentError
 from keepaway_agent.training.trial import trial_seed
 
@@ -57,6 +57,9 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     `infos`: "choosing", where there is a choice; "cycles" since the last one, "cycle" since
     kick-off, "keeper" who chooses; and for each of them a mask of the fields that have it.
+
+    Attributes:
+        variables: names of an observation's entries, in order.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - as the base class declares it
@@ -99,13 +102,14 @@ class KeeperVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._fields = DecisionFields(num_fields=self.num_envs, **settings)
         self._camera = Camera(self._fields, self.render_mode)
         task = self._fields.task
+        self.variables = variable_names(task)
         self.single_observation_space = observation_space(task)
         self.single_action_space = Discrete(task.num_keepers)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        variables = self.single_observation_space.high
+        highest = self.single_observation_space.high
         self._books = _books(self.num_envs)
-        self._for_results = self._max_steps, variables, np.zeros(len(variables))
+        self._for_results = self._max_steps, highest, np.zeros(len(highest))
         self._lay_kernels()
         self._all = np.ones(self.num_envs, dtype=np.bool_)
         self._all.flags.writeable = False
@@ -288,7 +292,11 @@ def _books(num_fields: int) -> KeeperBooks:
 
 
 class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
-    """One field, from choice to choice of the keeper that has the ball; see `KeeperVectorEnv`."""
+    """One field, from choice to choice of the keeper that has the ball; see `KeeperVectorEnv`.
+
+    Attributes:
+        variables: names of an observation's entries, in order.
+    """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
         "render_modes": ["rgb_array", "rgb_array_list", "human"],
@@ -310,6 +318,7 @@ class KeeperEnv(gymnasium.Env[np.ndarray, Any]):
         self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])
         self._env = KeeperVectorEnv(1, **settings)
         self._camera = Camera(self._env._fields, self.render_mode)
+        self.variables = self._env.variables
         self.observation_space = self._env.single_observation_space
         self.action_space: Discrete = self._env.single_action_space
         self._is_over = False

@@ -13,7 +13,7 @@ from keepaway_agent.environments.compiled_fields import NO_CHOICE
 from keepaway_agent.environments.fields import OUTSIDE, DecisionFields
 from keepaway_agent.environments.refusals import checked_limit, checked_mode, checked_seed
 from keepaway_agent.environments.snapshots import FieldState, with_new_luck
-from keepaway_agent.environments.spaces import observation_space, state_space
+from keepaway_agent.environments.spaces import observation_space, state_space, variable_names
 from keepaway_agent.errors import AgentError
 from keepaway_agent.playing.policies import KEEPER_REWARD, TAKER_REWARD
 from keepaway_agent.training.trial import trial_seed
@@ -173,6 +173,14 @@ class OneFieldEnv:
         self.possible_agents = self._field.names[:]
         self.agents: list[str] = []
         self.state_space = self._field.state_space
+
+    def variables(self, agent: str) -> tuple[str, ...]:
+        """Names of the entries of an agent's observation, in order.
+
+        Raises:
+            AgentError: no agent of this name.
+        """
+        return variable_names(self._field.fields.task, self._field.role(agent))
 
     def state(self) -> np.ndarray:
         """The truth, which no player knows: see `spaces.state_space`.

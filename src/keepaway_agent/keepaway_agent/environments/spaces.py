@@ -21,6 +21,15 @@ def observation_space(task: Task, role: Role = Role.KEEPER) -> Box:
     return Box(np.zeros(len(high), np.float32), np.array(high, np.float32), dtype=np.float32)
 
 
+def variable_names(task: Task, role: Role = Role.KEEPER) -> tuple[str, ...]:
+    """What the entries of a player's observation are, in order: see the package's README.
+
+    >>> variable_names(Task.parse("2v1"))[:3]
+    ('dist_k1_c', 'dist_k1_k2', 'dist_k1_t1')
+    """
+    return tuple(each.name for each in features(role, task.num_keepers, task.num_takers))
+
+
 def state_space(task: Task, config: Config) -> Box:
     """Of the truth: x, y [m] and vx, vy [m/cycle] of all players and the ball, then bodies [rad].
 
