@@ -8,6 +8,7 @@ from graph import Graph, weights_of
 
 from keepaway_agent.errors import AgentError
 from keepaway_agent.learning.weights import load_weights, save_weights
+from keepaway_agent.nodes.running import StoppedCompiling
 from keepaway_msgs.msg import AgentStatus
 from keepaway_msgs.srv import LoadWeights, SaveWeights
 from keepaway_sim.ros.publishing import LATCHED
@@ -156,3 +157,22 @@ def test_what_it_learned_goes_along_into_the_next_match(graph: Graph, ros_domain
     np.testing.assert_array_equal(keeper.agent.learned("").values, before)
     graph.play()
     assert keeper.agent.episodes == 2
+
+
+def test_a_player_that_is_asked_to_end_while_it_compiles_joins_no_match(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal raises in the callback; what spins must not take that for a fault of the node."""
+
+    def stopped(*_: object) -> None:
+        raise StoppedCompiling
+
+    monkeypatch.setattr("keepaway_agent.nodes.player.Agent", stopped)
+    keeper = graph.start_player("keeper_1")
+    asked: list[bool] = []
+    monkeypatch.setattr(
+        "keepaway_agent.nodes.player.conversions.match_facts", lambda match: asked.append(True)
+    )
+    graph.start_simulator()
+    graph.simulator.play(graph.spin, lambda: bool(asked))
+    assert keeper.agent is None

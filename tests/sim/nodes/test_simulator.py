@@ -319,7 +319,7 @@ def test_it_writes_its_own_bag(graph: Graph, tmp_path: Path) -> None:
 
 
 def test_another_simulator_is_refused_and_with_force_disturbs_nobody(
-    graph: Graph,
+    graph: Graph, tmp_path: Path
 ) -> None:
     simulator = graph.start_simulator(episodes=4, seed=3, answer_timeout=SLOW_ENOUGH)
     board = graph.add(Scoreboard(4, simulator.conductor.match_id, context=graph.context))
@@ -330,9 +330,13 @@ def test_another_simulator_is_refused_and_with_force_disturbs_nobody(
         arguments = ros_arguments({"seed": 9, **parameters}, "simulator")
         return Simulator(context=graph.context, cli_args=arguments, use_global_arguments=False)
 
-    refused = graph.add(another())
+    bag = tmp_path / "bag"
+    refused = graph.add(another(record=str(bag)))
     with pytest.raises(KeepawayError, match="another simulator publishes `match` here"):
         refused.play(graph.spin)
+    assert bag.is_dir()
+    refused.close()
+    assert not bag.exists()  # the same command can be given again, elsewhere
     forced = graph.add(another(force=True))
     stray = graph.node.create_publisher(Episode, "episode", ALL)
     for number in range(10):

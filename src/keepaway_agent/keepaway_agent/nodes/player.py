@@ -153,7 +153,11 @@ class PlayerNode(Node):
                 f"no place for {name} in a match of {', '.join(match.player_names)}"
             )
             return
-        agent = Agent(conversions.match_facts(match), match.player_names.index(name), self._config)
+        try:
+            facts, index = conversions.match_facts(match), match.player_names.index(name)
+            agent = Agent(facts, index, self._config)
+        except KeyboardInterrupt:  # it was asked to end while it compiled; whoever spins knows
+            return
         if agent.role != self._role:
             raise AgentError(f"{name} is a {agent.role.name.lower()}'s name in this match")
         has_learned = self.agent and self.agent.has_learner

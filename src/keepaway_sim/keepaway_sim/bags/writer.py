@@ -195,6 +195,20 @@ class BagWriter:
             (self.path / "metadata.yaml").write_text(text)
         self._is_open = False
 
+    def discard(self) -> None:
+        """Take the bag away again: there was nothing to record.
+
+        Nothing happens after `close`, or after an error.
+        """
+        if not self._is_open:
+            return
+        self._is_open = False
+        self._file.abandon()
+        with self._giving_up():
+            for part in (*self._finished, self._file.part):
+                (self.path / part.name).unlink(missing_ok=True)
+            self.path.rmdir()
+
     def __enter__(self) -> Self:
         return self
 

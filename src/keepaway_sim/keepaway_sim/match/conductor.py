@@ -196,11 +196,19 @@ class Conductor:
         found = f"another simulator publishes `match` here ({one_line(other['task'])})"
         has_just_come = self._clock() - self._arrived_at < ARRIVAL and not self._has_begun
         if has_just_come and not self.settings.force:
-            self._refusal = f"{found}: choose another namespace or domain, or force:=true"
+            self._refusal = (
+                f"{found}: choose another namespace or domain, or force:=true (match.py: --domain,"
+                " --force)"
+            )
         else:
             self._report.warn(
                 "match", f"{found}: match_id identifies them to players and scoreboards"
             )
+
+    @property
+    def is_refused(self) -> bool:
+        """Does it not play, because another simulator was here first?"""
+        return bool(self._refusal)
 
     def take_recorded(self, data: bytes, sender: bytes) -> None:
         """Take the bytes of the time that a recorder has reached."""

@@ -99,13 +99,15 @@ class Simulator(Node):
         super().destroy_node()
 
     def close(self) -> None:
-        """Finish the bag.
+        """Finish the bag; a match that was refused leaves none.
 
         Raises:
             KeepawayError: it is not whole.
         """
         self._publisher.write_recorded()
-        if self._bag is not None:
+        if self._bag is not None and self.conductor.is_refused:
+            self._bag.discard()
+        elif self._bag is not None:
             self._bag.close()
         if self._publisher.trouble:
             raise KeepawayError(self._publisher.trouble)
