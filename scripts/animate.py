@@ -1,7 +1,7 @@
 """Draw an animation (GIF) of keepers on one field, in the colours of the page.
 
-.venv/bin/python scripts/animate.py out/3v2 --seconds 12 --out keepers.gif
-.venv/bin/python scripts/animate.py --policy hand --task 4v3 --out hand.gif
+.venv/bin/python scripts/animate.py out/3v2 --seconds 12
+.venv/bin/python scripts/animate.py --policy hand --task 4v3 --out out/hand.gif
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the episodes (default 0)")
     parser.add_argument("--seconds", type=float, default=12.0, help="simulated (default 12)")
     parser.add_argument("--side", type=int, default=320, help="pixels (default 320)")
-    parser.add_argument("--out", type=Path, default=Path("keepers.gif"), help="GIF to write")
+    parser.add_argument("--out", type=Path, default=Path("out/keepers.gif"), help="GIF to write")
     return parser.parse_args()
 
 

@@ -67,6 +67,7 @@ def check(args: argparse.Namespace) -> int:
                 lambda: processes.is_running(AGENT),
                 args.answer_timeout,
             )
+            is_there = processes.is_running(AGENT)
             code = processes.end(AGENT, args.end_timeout)
     except (AgentError, OSError) as error:
         print(f"check_agent: {error}", file=sys.stderr)
@@ -75,6 +76,12 @@ def check(args: argparse.Namespace) -> int:
         return 130
     finally:
         rclpy.try_shutdown()
+    if not is_there:
+        answers = sum(each.answer_time is not None for each in simulator.log)
+        print(
+            f"the agent ended by itself after {answers} answers, with code {code}: mend that first,"
+            " most of what fails below follows from it"
+        )
     verdicts = judge(simulator.log, args.name, code)
     times = answer_times(simulator.log)
     print(report(verdicts, times))

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import json
 import os
 import shutil
 import subprocess
@@ -48,11 +47,16 @@ CYCLES_PER_HOUR = 36000
 PROGRESS_EVERY = 10.0  # [s]
 MARK = "made_by_the_demo.txt"  # what an earlier demo made is replaced only beside this file
 MADE = ("3v2_nodes", "3v2_bag", "3v2_trained", "4v3_start.npz", "4v3_starts", "4v3_nodes",
-        "4v3_bag", "learning_curves.png")  # fmt: skip
+        "4v3_bag", "learned_bag", "learning_curves.png")  # fmt: skip
 
 
 NEXT = (
-    ("watch the match", "view.py {out}/3v2_bag"),
+    (
+        "watch what was learned",
+        "match.py --episodes 5 --keeper-policy greedy"
+        " --load-weights {out}/3v2_trained --record {out}/learned_bag",
+    ),
+    ("", "view.py {out}/learned_bag"),
     ("see what was learned", "describe.py {out}/4v3_start.npz --draw {out}/pictures"),
     ("write an agent", "new_agent.py quick_keeper"),
     ("run the paper's study", "study.py table2 --workers 2 --out {out}/table2"),
@@ -116,7 +120,7 @@ def play(args: Args) -> int:
         print(f"\n[{time.monotonic() - start:4.0f} s] {step}", flush=True)
 
     say(f"1. 3v2 keepers learn as ROS nodes for {args.episodes} episodes, recorded")
-    learned = match(args, "3v2", "learn", args.out / "3v2_nodes", args.out / "3v2_bag")
+    match(args, "3v2", "learn", args.out / "3v2_nodes", args.out / "3v2_bag")
     say(f"2. {args.trials} x 3 keepers learn 3v2 for {args.source_hours:g} simulated hours, no ROS")
     script("train.py", "--task", "3v2", "--trials", str(args.trials), "--episodes", "1000000",
            "--hours", str(args.source_hours), "--seed", str(args.seed), "--processes", "2",
@@ -126,12 +130,12 @@ def play(args: Args) -> int:
     carried = args.out / "4v3_start.npz"
     print(transfer_by_node(sources[0], carried))
     say("4. 4v3 keepers play on from it as ROS nodes, learning")
-    moved = match(args, "4v3", "learn", args.out / "4v3_nodes", args.out / "4v3_bag", carried)
+    match(args, "4v3", "learn", args.out / "4v3_nodes", args.out / "4v3_bag", carried)
     say(f"5. 4v3 from scratch, after transfer, from an optimistic start: {args.trials} trials each")
     curves = study(args, sources)
     figure = draw(args, curves)
     say("done")
-    print(table(learned, moved, curves))
+    print(table(curves))
     print(f"\nlearning curves  {figure}\nbags             {args.out}/3v2_bag, {args.out}/4v3_bag")
     print(f"weights          {args.out}/3v2_nodes, {args.out}/3v2_trained, {carried}")
     print("\nwhat next")
@@ -176,21 +180,11 @@ def running(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen
 
 def match(
     args: Args, task: str, policy: str, weights: Path, bag: Path, start: Path | None = None
-) -> dict[str, Any]:
-    """Play a match of ROS nodes, each a process; its summary."""
-    command = [sys.executable, str(SCRIPTS / "match.py"), "--task", task, "--json"]
-    command += ["--episodes", str(args.episodes), "--keeper-policy", policy]
-    command += ["--seed", str(args.seed), "--save-weights", str(weights), "--record", str(bag)]
-    command += ["--load-weights", str(start)] if start else []
-    lines: list[str] = []
-    with running(command, stdout=subprocess.PIPE) as process:
-        assert process.stdout
-        for line in process.stdout:
-            lines.append(line)
-            if not line.startswith("{"):
-                print(line, end="", flush=True)
-    summary: dict[str, Any] = json.loads(lines[-1])
-    return summary
+) -> None:
+    """Play a match of ROS nodes, each a process."""
+    arguments = ["--task", task, "--episodes", str(args.episodes), "--keeper-policy", policy]
+    arguments += ["--seed", str(args.seed), "--save-weights", str(weights), "--record", str(bag)]
+    script("match.py", *arguments, *(["--load-weights", str(start)] if start else []))
 
 
 def transfer_by_node(source: Path, target: Path) -> str:
@@ -276,24 +270,19 @@ def draw(args: Args, groups: dict[str, list[np.ndarray]]) -> Path:
     return path
 
 
-def table(
-    learned: dict[str, Any], moved: dict[str, Any], groups: dict[str, list[np.ndarray]]
-) -> str:
-    """What came out, a row each; errors are by trial, and a match is but one."""
+def table(groups: dict[str, list[np.ndarray]]) -> str:
+    """What came out, a row each; errors are standard errors over trials."""
     # Here, because the matches and a refusal need no statistics: importing them takes seconds.
     from keepaway_transfer.reports.statistics import mean_and_error
 
-    rows = [f"{'what':48s} {'held (s)':>9s} {'+-':>5s}"]
-
-    def add(label: str, mean: float, error: float | None) -> None:
-        rows.append(f"{label:48s} {mean:9.2f} {'-' if error is None else f'{error:.2f}':>5s}")
-
-    for summary, label in ((learned, "3v2 nodes, learning"), (moved, "4v3 nodes, after transfer")):
-        add(f"{label}, {summary['episodes']} episodes", summary["mean_duration_s"], None)
+    rows = [f"{'what':48s} {'ball held (s)':>14s} {'+- s.e.':>8s}"]
     for label, trials in groups.items():
         for part, episodes in (("first", slice(0, WINDOW)), ("last", slice(-WINDOW, None))):
             means = [durations[episodes].mean() for durations in trials]
-            add(f"4v3 {label}, {part} {WINDOW} episodes", *mean_and_error(means))
+            mean, error = mean_and_error(means)
+            shown = "-" if error is None else f"{error:.2f}"
+            name = f"4v3 {label}, {part} {WINDOW} episodes"
+            rows.append(f"{name:48s} {mean:14.2f} {shown:>8s}")
     return "\n".join(rows)
 
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 
 import pytest
 
@@ -196,6 +197,26 @@ def test_constants_of_world_and_learner_are_changed_by_name():
 def test_what_makes_no_study_is_refused_by_name(change, message):
     with pytest.raises(StudyError, match=re.escape(message)):
         study_from({**PLAIN, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"treshold": 3.0}, "treshold: no such setting; did you mean threshold?"),
+        ({"rows": [{"name": "0", "varient": "rho"}]}, "row 0: varient: no such .* mean variant?"),
+        ({"rows": [{"name": "0", "stages": [{"taks": "3v2"}]}]}, "taks: no such .* mean task?"),
+    ],
+)
+def test_a_misspelled_entry_is_named_with_the_nearest(change, words):
+    with pytest.raises(StudyError, match=words):
+        study_from({"name": "mine", "target": "4v3", **change})
+
+
+def test_the_study_in_the_readme_is_one():
+    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
+    text = readme.split("```toml\n")[1].split("```")[0]
+    study = study_from(tomllib.loads(text))
+    assert [row.name for row in study.rows] == ["scratch", "300"]
 
 
 def test_a_missing_entry_is_named():

@@ -60,7 +60,10 @@ def learning_curves(
             xytext=(-4, 3), textcoords="offset points", fontsize=8, ha="right",
         )  # fmt: skip
     axes.set_xlim(left=0)
-    axes.legend(edgecolor="none", loc="best")  # its white ground keeps lines from the words
+    axes.legend(
+        title="mean of all trials, 95 %; thin: single ones", title_fontsize=8,
+        edgecolor="none", loc="best",  # its white ground keeps lines from the words
+    )  # fmt: skip
     return figure
 
 
@@ -137,8 +140,8 @@ def _both_times(
 ) -> list[tuple[str, Sequence[Interval], str, float]]:
     """Label, times, colour and place beside the row's own of the two kinds of hours."""
     return [
-        ("target task", target, ROW_COLOURS[1], -0.08),
-        ("source + target", total, ROW_COLOURS[2], 0.08),
+        ("of the task alone", target, ROW_COLOURS[1], -0.08),
+        ("with the tasks before", total, ROW_COLOURS[2], 0.08),
     ]
 
 

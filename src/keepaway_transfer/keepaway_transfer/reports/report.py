@@ -78,7 +78,7 @@ def write_report(
         folder: made if it does not exist.
         threshold: another than the study's [s].
         curves: rows whose learning curves are drawn beside those from scratch; by default the
-            study's other references and the row with the shortest total time.
+            study's other references and the rows with the shortest target and total times.
 
     Returns:
         the table.
@@ -187,9 +187,14 @@ def _made_by(results: StudyResults) -> str:
 
 
 def _best(rows: Sequence[RowSummary], scratch: str) -> list[str]:
-    """The row with the shortest total time."""
+    """The rows with the shortest total time and with the shortest time in the target task."""
     others = [row for row in rows if row.name != scratch]
-    return [min(others, key=lambda row: row.total.estimate).name] if others else []
+    if not others:
+        return []
+    return [
+        min(others, key=lambda row: row.total.estimate).name,
+        min(others, key=lambda row: row.target.estimate).name,
+    ]
 
 
 def _figures(

@@ -8,6 +8,7 @@ no stages is training from scratch.
 Row(name='1000', stages=(Stage(task='3v2', episodes=1000),), variant='rho', widths='')
 """
 
+import difflib
 import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
@@ -183,19 +184,33 @@ def study_from(data: Mapping[str, Any]) -> Study:
         StudyError: an entry that is missing, unknown or of no use, by name.
     """
     try:
+        _refuse_unknown(data, Study)
         rows = tuple(_row_from(row) for row in data["rows"])
         rest = {key: value for key, value in data.items() if key != "rows"}
         return Study(rows=rows, references=tuple(rest.pop("references")), **rest)
     except KeyError as missing:
-        raise StudyError(f"{missing} is missing") from missing
+        raise StudyError(
+            f"{missing} is missing; studies/tiny.toml shows a whole study"
+        ) from missing
     except (KeepawayError, AgentError) as error:
         raise StudyError(str(error)) from error
     except (TypeError, AttributeError) as error:
         raise StudyError(f"not the settings of a study: {error}") from error
 
 
+def _refuse_unknown(data: Mapping[str, Any], kind: type[attrs.AttrsInstance]) -> None:
+    known = [field.name for field in attrs.fields(kind)]
+    for name in data:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            way_out = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+            raise StudyError(f"{name}: no such setting; {way_out}")
+
+
 def _row_from(data: Mapping[str, Any]) -> Row:
     try:
+        for part, kind in ((data, Row), *((stage, Stage) for stage in data.get("stages", ()))):
+            _refuse_unknown(part, kind)
         stages = tuple(Stage(**stage) for stage in data.get("stages", ()))
         return Row(**{**data, "stages": stages})
     except (KeepawayError, AgentError) as error:
