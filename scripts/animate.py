@@ -85,7 +85,7 @@ def played(args: argparse.Namespace) -> Iterator[Image.Image]:
 
 def save(frames: list[Image.Image], args: argparse.Namespace) -> None:
     """Write the frames with one palette, ten a second."""
-    palette = frames[0].quantize(COLOURS)
+    palette = frames[0].quantize(COLOURS, Image.Quantize.FASTOCTREE)  # which keeps rare colours
     first, *others = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     period = round(1000 / CYCLES_A_SECOND)
     args.out.parent.mkdir(parents=True, exist_ok=True)

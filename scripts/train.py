@@ -1,4 +1,4 @@
-"""Train players in one program, without ROS: the same rules and results, a hundred times faster.
+"""Train players in one program, without ROS: the same rules and results, many times faster.
 
     .venv/bin/python scripts/train.py --task 3v2 --episodes 8000 --save-weights out/3v2
     .venv/bin/python scripts/train.py --task 4v3 --trials 20 --episodes 5000 --save-weights out/4v3

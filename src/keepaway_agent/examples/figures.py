@@ -14,7 +14,7 @@ from keepaway_sim.version import code_version
 
 def made_here() -> dict[str, str]:
     """This command, and the version of the code that it runs."""
-    return {"command": shlex.join(["python", *sys.argv]), "code_version": code_version()}
+    return {"command": shlex.join([".venv/bin/python", *sys.argv]), "code_version": code_version()}
 
 
 def keep(folder: Path, name: str, **data: Any) -> None:
