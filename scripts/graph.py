@@ -57,12 +57,13 @@ def discover(node: Node, quiet: float) -> None:
 
 def print_graph(node: Node, show_all: bool) -> None:
     """Nodes; topics with their types and the number of publishers and subscribers; services."""
-    print("Nodes")
     own = node.get_fully_qualified_name()
-    for name, namespace in sorted(node.get_node_names_and_namespaces()):
-        full = f"{namespace.rstrip('/')}/{name}"
-        if full != own:
-            print(f"  {full}")
+    found = [f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces()]
+    if not (others := sorted(name for name in found if name != own)):
+        domain = os.environ.get("ROS_DOMAIN_ID", "0")
+        print(f"no node in ROS domain {domain}: is a match running, or in another one (--domain)?")
+        return
+    print("Nodes", *(f"  {name}" for name in others), sep="\n")
     print("Topics, publishers -> subscribers")
     for topic, types in sorted(node.get_topic_names_and_types()):
         if show_all or topic not in HIDDEN:

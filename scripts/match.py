@@ -363,8 +363,8 @@ def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
         summary = {**summary, "sem_duration_s": None}
     mean, sem = (summary[f"{name}_duration_s"] for name in ("mean", "sem"))
     if mean is not None:
-        unknown = " (if no player learns)" if args.agent else ""
-        spread = "" if sem is None else f" +- {sem:.2f}{unknown}"
+        unknown = ", if no player learns" if args.agent else ""
+        spread = "" if sem is None else f" +- {sem:.2f} (standard error{unknown})"
         print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
     if args.json:
         print(json.dumps({"task": args.task, "seed": args.seed, **summary}, allow_nan=False))

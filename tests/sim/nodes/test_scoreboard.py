@@ -40,7 +40,7 @@ def test_a_file_gets_lines(context: rclpy.Context) -> None:
     board = Scoreboard(4, out=out, context=context)
     play(board, 3)
     first, last = out.getvalue().splitlines()
-    assert first == "1 episodes, last 1 held 5.00 s, no simulator was found"
+    assert first == "1 episode, last 1 held 5.00 s, no simulator was found"
     assert last == "3 episodes, last 3 held 5.00 s, no simulator was found"
 
 

@@ -131,7 +131,7 @@ def in_words(summary: Mapping[str, Any]) -> str:
         )
     sem = summary["sem_duration_s"]
     # Episodes of players that learn depend on each other; a bag does not tell who learned.
-    spread = f" +- {sem:.2f} (if no player learned)" if sem is not None else ""
+    spread = f" +- {sem:.2f} (standard error, if no player learned)" if sem is not None else ""
     lines = [
         f"{summary['task']}: {summary['episodes']:,} episodes in {summary['messages']:,} messages",
         f"held {summary['mean_duration_s']:.2f} s{spread} on average,"

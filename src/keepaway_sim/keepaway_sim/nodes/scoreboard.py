@@ -102,7 +102,8 @@ class Scoreboard(Node):
         bar.set_postfix_str(self._words(), refresh=False)
         bar.update(len(self.episodes) - bar.n)
         if bar.disable:  # the output is no terminal
-            self._out.write(f"{len(self.episodes)} episodes, {self._words()}\n")
+            plural = "s" if len(self.episodes) > 1 else ""
+            self._out.write(f"{len(self.episodes)} episode{plural}, {self._words()}\n")
             self._out.flush()
         else:
             bar.refresh()
