@@ -98,8 +98,11 @@ def draw_values(weights: LearnedWeights) -> Figure:
         low, high, width = tiling.lows[i], tiling.highs[i], tiling.widths[i]
         x = low + np.arange(added.shape[2]) * width / NUM_TILINGS
         shown = x <= high
-        for curve, colour in zip(added[:, i, shown], itertools.cycle(LINE_COLOURS), strict=False):
-            axes.plot(factor * x[shown], curve, color=colour, linewidth=1.2)
+        curves = added[:, i, shown]
+        for action, colour in zip(range(len(curves)), itertools.cycle(LINE_COLOURS), strict=False):
+            hides_one = (curves[:action] == curves[action]).all(axis=1).any()
+            style = "--" if hides_one else "-"  # after rho, two actions have the same weights
+            axes.plot(factor * x[shown], curves[action], style, color=colour, linewidth=1.2)
         axes.set_xlabel(f"{name} [{'deg' if _is_angle(name) else 'm'}]")
         axes.grid(alpha=0.3)
     figure.supylabel("adds to the action's value [cycles]")
@@ -129,6 +132,12 @@ def draw_preferences(weights: LearnedWeights) -> Figure:
         xlabel=f"distance of {_mover(weights)} from K1 [m]",
         ylabel="its angle from the pass lane to K2 [deg]",
         title="near and in the pass lane",
+    )
+    decider = "K1" if weights.role == Role.KEEPER else "the taker"
+    figure.supxlabel(
+        f"Colour: what {decider} prefers with {_mover(weights)} there; the paler, the less decided;"
+        " grey: never learned. Circles: keepers; T: the other takers, which stay.",
+        fontsize=9,
     )
     _legend(figure, weights)
     return figure

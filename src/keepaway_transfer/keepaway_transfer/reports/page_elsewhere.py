@@ -18,8 +18,8 @@ PAPER = [
     " begin hardly better than new ones but learn faster. A modified rho takes 10 to 20 % longer in"
     " all than rho. There is no row that starts with a constant instead of a source: whether it is"
     " what was learned that helps, or only that something is expected of every action, is open"
-    " there. The numbers of its Table 2 are lost in the copy at hand, so its claims are compared, not"
-    " its hours.",
+    " there. The numbers of its Table 2 are lost in the copy at hand, so its claims are compared,"
+    " not its hours.",
 ]  # fmt: skip
 
 
