@@ -55,6 +55,9 @@ def test_every_trial_that_is_left_is_planned_once(shared, done, batch):
 def test_rows_that_share_their_sources_are_played_together():
     study = attrs.evolve(TINY, shared_sources=True)
     assert plan(study, set(), batch=3)[0] == (("0", 0), ("4", 0), ("8", 0))
+    many = attrs.evolve(load_study("variants_1000"), trials=20)
+    sources = [{number for _, number in keys} for keys in plan(many, set(), batch=50)]
+    assert sources == [set(range(10)), set(range(10, 20))]  # 20 rows each
 
 
 def test_rows_far_apart_take_turns():

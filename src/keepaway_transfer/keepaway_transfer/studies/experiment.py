@@ -18,14 +18,16 @@ Key = tuple[str, int]  # a row's name and a trial's number
 PlayBatch = Callable[[Study, Sequence[Key]], list[StudyTrial]]
 
 GOLDEN_SECTION = (math.sqrt(5.0) - 1.0) / 2.0
+TRIALS_A_SOURCE = 5
 TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
 
 
 def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...]]:
     """The trials that are left, in batches of about `batch` that are played together.
 
-    Rows that share their trials' source runs stay together, so that those are played once. All
-    rows get on at the same pace: a study that is stopped early has about as many trials of each.
+    Rows that share their trials' source runs stay together, so that those are played once; of such
+    runs a batch has a fifth of `batch` at least, as few runs side by side are slow each. All rows
+    get on at the same pace: a study that is stopped early has about as many trials of each.
     Rows far apart in the study take turns, so that its first batches are a fair sample of it: the
     time left is estimated from them.
 
@@ -36,7 +38,7 @@ def plan(study: Study, done: Collection[Key], batch: int) -> list[tuple[Key, ...
     names = [row.name for row in study.rows]
     numbers = range(study.trials)
     if study.shared_sources:
-        together = max(1, batch // len(names))
+        together = max(1, batch // len(names), batch // TRIALS_A_SOURCE)
         groups = [
             [(name, number) for number in some for name in names]
             for some in _chunks(numbers, together)
