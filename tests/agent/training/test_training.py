@@ -168,6 +168,11 @@ def test_weights_of_another_task_are_refused(tmp_path):
     larger = Training(task="4v3", load_weights=str(folder.path / "keeper_1.npz"))
     with pytest.raises(WeightsError, match=r"keeper in 3v2, not of a keeper in 4v3"):
         larger.start()
+    team = Training(task="4v3", load_weights=str(folder.path))
+    with pytest.raises(
+        WeightsError, match=r"has no keeper_4.npz, and 4v3 has 4 keepers: .*transfer"
+    ):
+        team.start()
 
 
 def test_the_script_says_how_it_went(tmp_path):

@@ -204,7 +204,7 @@ def test_it_tells_how_far_a_players_belief_is_off(
     page.value("select(1); choosePlayer(1); seek(20)")
     known = (track.age[20, 1] <= 12) & (np.arange(6) != 1)
     off = np.linalg.norm(track.believed[20, 1] - track.position[20], axis=1)[known].max()
-    assert f"It is {off:.1f} m off about" in text(page, "#mind")
+    assert f"{off:.1f} m from the true place" in text(page, "#mind")
 
 
 def colour_at(page: Browser, place: np.ndarray) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ import attrs
 import numpy as np
 
 from keepaway_agent.actions import Role
+from keepaway_agent.errors import WeightsError
 from keepaway_agent.learning.config import LearnerConfig
 from keepaway_agent.learning.weights import (
     HOURS_PER_CYCLE,
@@ -105,6 +106,11 @@ class Training:
         path, config = Path(self.load_weights), self.trainer
         names = config.task.player_names[: config.task.num_keepers]
         files = [path / f"{name}.npz" for name in names] if path.is_dir() else [path] * len(names)
+        if missing := [file.name for file in files if path.is_dir() and not file.exists()]:
+            raise WeightsError(
+                f"{path} has no {missing[0]}, and {config.task.name} has {len(names)} keepers:"
+                " scripts/transfer.py carries over what was learned in a smaller task"
+            )
         weights = [load_weights(file) for file in files]
         tiling = config.tiling(Role.KEEPER)
         for each in weights:

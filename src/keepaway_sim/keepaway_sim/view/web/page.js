@@ -354,7 +354,8 @@ function objectsOff(frame, me) {
   if (who < 0) return unknown ? "It has lost sight of everybody." : "";
   const name = who === ballIndex() ? "the ball" : nick(who);
   const lost = unknown ? ` It has lost sight of ${unknown} of the players.` : "";
-  return `It is ${worst.toFixed(1)} m off about ${name}, and less about the others.${lost}`;
+  const where = `It believes ${name} ${worst.toFixed(1)} m from the true place, and the others nearer to theirs`;
+  return `${where} (hollow circles: where it believes them).${lost}`;
 }
 
 function paragraph(text, kind = "") {
