@@ -32,7 +32,7 @@ def main() -> int:
     try:
         discover(node, args.wait)
         if args.topic:
-            return echo(node, args.topic, args.count)
+            return echo(node, f"/{args.topic.lstrip('/')}", args.count)
         print_graph(node, args.all)
     except KeyboardInterrupt:
         pass

@@ -79,6 +79,7 @@ class Member(NamedTuple):
 def main() -> int:
     """Play, say how it went."""
     args = parse()
+    args.namespace = args.namespace and f"/{args.namespace.strip('/')}"
     signals = received_signals(SIGNALS)
     if args.domain is not None:
         os.environ["ROS_DOMAIN_ID"] = str(args.domain)

@@ -64,7 +64,7 @@ def watch(host: str, port: int, ros: list[str]) -> int:
     try:
         server = Server(host, port)
     except (OSError, OverflowError) as error:
-        print(f"view: {host}:{port}: {error}", file=sys.stderr)
+        print(f"view: {host}:{port}: {error}; --port takes another one", file=sys.stderr)
         return 1
     rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
     try:

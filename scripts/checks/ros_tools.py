@@ -39,7 +39,9 @@ the checkout:
     ros2/rosidl_runtime_py                            osrf/osrf_pycommon
     .venv/bin/python -m pip install --no-deps --no-build-isolation --prefix DIR FOLDERS..
 and ros2/rcl_interfaces: composition_interfaces, which launch_ros imports; it is built with a copy
-of msgs/cmake and of msgs/pyproject.toml with its own name.
+of msgs/cmake and of msgs/pyproject.toml with its own name. To use them by hand:
+    export PATH=DIR/bin:.venv/bin:$PATH AMENT_PREFIX_PATH=DIR:$AMENT_PREFIX_PATH
+    export PYTHONPATH=$(echo DIR/lib/python3.*/site-packages) LD_LIBRARY_PATH=DIR/lib
 """
 
 

@@ -47,19 +47,28 @@ class BringUp:
     taker_policy: str = setting("hand", "of every taker", choices=tuple(TAKER_POLICIES))
     load_weights: str = setting("", "file, or folder with NAME.npz, that players begin with")
     save_weights: str = setting("", "folder in which learners write NAME.npz")
+    elsewhere: str = setting("", "players that are started otherwise, like keeper_1,taker_2")
     namespace: str = setting("", "of every node and topic, /clock included; empty: none")
     use_sim_time: bool = setting(False, "the players' clocks are the simulator's")
     params_file: str = setting("", "parameters of nodes that count more than these; empty: none")
 
     def __attrs_post_init__(self) -> None:
         try:
-            Task.parse(self.task, self.field)
+            names = Task.parse(self.task, self.field).player_names
         except KeepawayError as error:
             raise SettingError(f"task or field: {error}") from error
+        for name in self.absent:
+            if name not in names:
+                raise SettingError(f"elsewhere={name}: {self.task} has {', '.join(names)}")
         for name in ("load_weights", "params_file"):
             path = getattr(self, name)
             if path and not Path(path).exists():
                 raise SettingError(f"{name}={path}: there is no such file")
+
+    @property
+    def absent(self) -> list[str]:
+        """Names of the players that it does not start."""
+        return [name.strip() for name in self.elsewhere.split(",") if name.strip()]
 
 
 class NodeSpec(NamedTuple):
@@ -102,6 +111,8 @@ def node_specs(given: BringUp, match_id: int) -> list[NodeSpec]:
         )
     ]
     for player, name in enumerate(task.player_names):
+        if name in given.absent:
+            continue
         role = task.role(player)
         parameters = {**player_parameters(given, name, role), "match_id": match_id}
         made.append(NodeSpec("keepaway_agent", role.name.lower(), name, parameters, remaps))

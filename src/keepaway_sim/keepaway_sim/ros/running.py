@@ -121,8 +121,8 @@ def check_arguments(name: str, settings: Sequence[type], args: Sequence[str]) ->
         raise SystemExit(0)
     if own:
         raise SystemExit(
-            f"{name}: {' '.join(own)}: not understood; parameters are given as"
-            f" --ros-args -p NAME:=VALUE, and --help lists them"
+            f"{name}: {' '.join(own)}: not understood; parameters and names are given as"
+            f" --ros-args -p NAME:=VALUE -r __node:=NAME, and --help lists them"
         )
 
 
