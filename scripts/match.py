@@ -88,6 +88,7 @@ def main() -> int:
         seat_agents(args, task)
         check_files(args)
         args.match_id = random_match_id()
+        announce(args)
         play = play_in_one_process if args.single_process else play_in_processes
         board, failed = play(args, members(args, task), signals)
     except (AgentError, KeepawayError, MatchError, OSError) as error:
@@ -104,6 +105,17 @@ def main() -> int:
     if signals:
         return 128 + signals[0]  # as shells expect it: 130 after Ctrl-C
     return 1 if failed else 0
+
+
+def announce(args: argparse.Namespace) -> None:
+    """Say what is going to be played, before anything of it can be seen."""
+    parts = [f"{args.task}: keepers {args.keeper_policy}, takers {args.taker_policy}"]
+    parts += [f"{name} by {command}" for name, command in args.agent.items()]
+    parts += [f"waits for {', '.join(args.elsewhere)} to be started elsewhere"] * bool(
+        args.elsewhere
+    )
+    parts += [f"records to {args.record}"] if args.record else []
+    print("; ".join(parts), flush=True)
 
 
 def seat_agents(args: argparse.Namespace, task: Task) -> None:
@@ -367,6 +379,10 @@ def report(args: argparse.Namespace, summary: dict[str, object]) -> None:
         unknown = ", if no player learns" if args.agent else ""
         spread = "" if sem is None else f" +- {sem:.2f} (standard error{unknown})"
         print(f"{args.task}: {summary['episodes']} episodes, held {mean:.2f}{spread} s on average")
+    if args.record and Path(args.record).is_dir():
+        print(f"recorded in {args.record}: scripts/view.py {args.record} shows it")
+    if args.save_weights and args.save_weights.is_dir():
+        print(f"what was learned is in {args.save_weights}")
     if args.json:
         print(json.dumps({"task": args.task, "seed": args.seed, **summary}, allow_nan=False))
 

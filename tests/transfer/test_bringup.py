@@ -97,10 +97,16 @@ def test_two_launches_are_two_matches(launch_file: ModuleType) -> None:
     assert len(ids) == 2
 
 
+def test_players_that_are_started_elsewhere_are_left_out() -> None:
+    specs = node_specs(from_arguments(chosen(elsewhere="keeper_1, taker_2")), 1)
+    assert [spec.name for spec in specs] == ["simulator", "keeper_2", "keeper_3", "taker_1"]
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("task", "three"),
+        ("elsewhere", "keeper_4"),
         ("speed", "-1"),
         ("speed", "fast"),
         ("episodes", "1.5"),
