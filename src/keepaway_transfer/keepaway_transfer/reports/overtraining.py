@@ -16,6 +16,7 @@ from keepaway_transfer.reports.page_parts import (
     less,
     listed,
     not_run,
+    parts_of_rho,
     shown_picture,
     study_table,
 )
@@ -67,7 +68,7 @@ def overtraining(studies: Studies) -> Lines:
         *(not_run(*missing) if missing else by_other_ways(studies)),
     ]
     if (variants := studies.get("variants_6000")) is not None:
-        lines += ["", *_best_way(variants)]
+        lines += ["", *_best_way(variants), "", *parts_of_rho(variants)[:-1]]
         for reference in variants.study.references:
             lines += ["", f"`variants_6000`, against {reference}:", ""]
             lines += study_table(variants, reference, "row")

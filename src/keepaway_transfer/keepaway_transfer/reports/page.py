@@ -27,6 +27,7 @@ from keepaway_transfer.reports.page_parts import (
     not_run,
     note,
     own_picture,
+    parts_of_rho,
     said_of,
     shown_picture,
     study_table,
@@ -129,7 +130,7 @@ def _rows(studies: Studies) -> Lines:
     if (fivevfour := studies.get("fivevfour")) is not None:
         lines += ["", "### 5v4", "", *note(fivevfour), *_fivevfour(fivevfour)]
     if (variants := studies.get("variants_1000")) is not None:
-        lines += ["", "### Other ways than rho (`variants_1000`)", "", *_parts_of_rho(variants)]
+        lines += ["", "### Other ways than rho (`variants_1000`)", "", *parts_of_rho(variants)]
         lines += _variants(variants)
         picture = shown_picture("Hours to 9.0 s by the way of transfer", "variants_1000")
         lines += ["", picture]
@@ -174,28 +175,6 @@ def _at_lower_threshold(studies: Studies) -> Lines:
     )
     title = f"### The same trials to {LOWER_THRESHOLD:g} s"
     return ["", title, "", words, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
-
-
-def _parts_of_rho(variants: Evidence) -> Lines:
-    """What each part of what rho carries saves by itself."""
-    gain = {
-        name: spread(row.against[variants.scratch].target)
-        for name, row in variants.rows.items()
-        if name != variants.scratch
-    }
-    at_5 = variants.rows["shape, preferences at 5 s"].against["optimistic at 5 s"]
-    return [
-        f"Hours of 4v3 saved against scratch: by rho {gain['rho']}. What rho carries is a level"
-        " (the mean value of an action), a shape (differences between states) and preferences"
-        f" (differences between actions). The level alone saves {gain['level']}, the shape alone"
-        f" {gain['shape']}, preferences alone {gain['preferences']}, shape and preferences without"
-        f" the level {gain['shape, preferences']}. A mapping that is shuffled saves"
-        f" {gain['shuffled']}.",
-        "",
-        f"At a level of 5 s, shape and preferences take {less(at_5.target)} of 4v3 than the"
-        f" constant 5 s, and {less(at_5.total)} in all, where the hours of 3v2 count.",
-        "",
-    ]
 
 
 def _variants(variants: Evidence) -> Lines:
