@@ -60,9 +60,9 @@ def learning_curves(
             xytext=(-4, 3), textcoords="offset points", fontsize=8, ha="right",
         )  # fmt: skip
     axes.set_xlim(left=0)
-    axes.legend(
-        title="mean of all trials, 95 %; thin: single ones", title_fontsize=8,
-        edgecolor="none", loc="best",  # its white ground keeps lines from the words
+    figure.legend(
+        title="mean of all trials, 95 %; thin: single ones", title_fontsize=8, fontsize=9,
+        frameon=False, loc="outside upper center", ncols=2,
     )  # fmt: skip
     return figure
 

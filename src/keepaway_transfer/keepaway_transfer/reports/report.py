@@ -140,9 +140,14 @@ def _number(value: float, form: str) -> str:
     return "-" if np.isnan(value) else format(value, form)
 
 
+def hours_tell(rows: Sequence[RowSummary]) -> bool:
+    """Did half the trials of some row reach the threshold? Else hours are but the limit."""
+    return any(2 * row.reached >= row.trials for row in rows)
+
+
 def _comparison_table(rows: Sequence[RowSummary], reference: str) -> list[str]:
-    """Every row against a reference; hours only where half the trials of some row reached any."""
-    with_hours = any(2 * row.reached >= row.trials for row in rows)
+    """Every row against a reference."""
+    with_hours = hours_tell(rows)
     hours = (
         " target hours saved | p | p (log-rank) | | total hours saved | p | |" if with_hours else ""
     )
@@ -189,7 +194,7 @@ def _made_by(results: StudyResults) -> str:
 def _best(rows: Sequence[RowSummary], scratch: str) -> list[str]:
     """The rows with the shortest total time and with the shortest time in the target task."""
     others = [row for row in rows if row.name != scratch]
-    if not others:
+    if not others or not hours_tell(rows):
         return []
     return [
         min(others, key=lambda row: row.total.estimate).name,
