@@ -88,7 +88,8 @@ def main() -> int:
         seat_agents(args, task)
         check_files(args)
         args.match_id = random_match_id()
-        announce(args)
+        if not args.json:
+            announce(args)
         play = play_in_one_process if args.single_process else play_in_processes
         board, failed = play(args, members(args, task), signals)
     except (AgentError, KeepawayError, MatchError, OSError) as error:

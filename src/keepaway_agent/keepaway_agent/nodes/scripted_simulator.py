@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Clock
 from keepaway_agent.checks import conformance
 from keepaway_agent.checks.conformance import Exchange, Garbage, Pause, Request, Shown, Step
 from keepaway_agent.errors import AgentError
-from keepaway_agent.nodes.qos import ANSWERS, STATUSES
+from keepaway_agent.nodes.qos import ANSWERS, MATCHES_KEPT, STATUSES
 from keepaway_agent.texts import one_line
 from keepaway_msgs.msg import ActionRequest, AgentStatus, Match, Perception
 
@@ -48,7 +48,7 @@ class ScriptedSimulator(Node):
             ActionRequest, f"{name}/action_request", self._on_request, ANSWERS, raw=True
         )
         self.create_subscription(AgentStatus, f"{name}/status", self._on_status, STATUSES)
-        self.create_subscription(Match, "match", self._on_match, STATUSES)
+        self.create_subscription(Match, "match", self._on_match, MATCHES_KEPT)
 
     def perform(
         self, steps: Iterable[Step], spin: Spin, is_there: Callable[[], bool], patience: float
