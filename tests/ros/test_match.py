@@ -113,7 +113,7 @@ def test_a_player_that_is_killed_is_named_and_the_match_goes_on() -> None:
     wait_for(match, lambda: "keeper_2" in nodes_of(match))
     assert match.stderr is not None
     line = match.stderr.readline()
-    while "episodes" not in line:
+    while "episode" not in line:
         line = match.stderr.readline()
         assert line, "it has ended"
     os.kill(nodes_of(match)["keeper_2"], signal.SIGKILL)

@@ -161,7 +161,8 @@ def _confirmation(studies: Studies) -> Lines:
         f"Rows of `table2_at_5` after few episodes were chosen for their totals, so they were"
         f" played again on new trials (`confirmation`, {one.origin}, seed {one.study.seed}). Beside"
         f" a constant start of {start} the time in all is"
-        f" {by_verdict(verdicts, 'after {} episodes')}:",
+        f" {by_verdict(verdicts, 'after {} episodes')}. Constants between those of `optimistic`"
+        " were not tried, and what of so little 3v2 makes the difference is not known:",
         "",
         *study_table(one, start, "episodes of 3v2, at 5 s"),
     ]
