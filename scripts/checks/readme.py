@@ -149,7 +149,8 @@ def claims(studies: Studies) -> list[tuple[str, bool]]:
         ),
         (
             f"In all hours {few} episodes of 3v2 at a level of 5 s (`{early.row(few).variant}`)"
-            f" save {spread(ahead.total)} h against that constant on new trials; no other way does.",
+            f" save {spread(ahead.total)} h against that constant on new trials; no other way"
+            " does.",
             verdict(ahead.total, ahead.total_holm) == "saves"
             and not any(one.verdict == "saves" for one in totals),
         ),
