@@ -130,12 +130,15 @@ def train(
         Cycles a second once it runs, or None if nothing was played, and the exit code.
     """
     meter, played, code = Meter(len(numbers)), Progress(), 0
-    total = len(numbers) * training.episodes
-    with ProgressBar("train", total, "episodes") as bar:
+    by_time = training.hours > 0  # then that is what ends a trial, most likely
+    total = max(1, round(60 * training.hours)) if by_time else training.episodes
+    unit = "simulated minutes" if by_time else "episodes"
+    with ProgressBar("train", len(numbers) * total, unit) as bar:
 
         def watch(progress: Progress) -> None:
             meter.read(progress)
-            bar.show(progress.episodes, str(meter))
+            minutes = round(60 * progress.cycles * HOURS_PER_CYCLE)
+            bar.show(minutes if by_time else progress.episodes, str(meter))
 
         try:
             spread = arguments.processes, arguments.fields
