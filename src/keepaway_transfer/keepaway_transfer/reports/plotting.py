@@ -58,6 +58,7 @@ def learning_curves(
         axes.annotate(
             f"threshold {threshold:g} s", (1, threshold), xycoords=("axes fraction", "data"),
             xytext=(-4, 3), textcoords="offset points", fontsize=8, ha="right",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
         )  # fmt: skip
     axes.set_xlim(left=0)
     figure.legend(
