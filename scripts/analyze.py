@@ -34,9 +34,7 @@ from keepaway_transfer.errors import LogError, TransferError
 if TYPE_CHECKING:
     from keepaway_transfer.reports.kwy import KeepawayLog
 
-TRAINING_FILE = (
-    "training.json"  # scripts/train.py writes it; what reads it takes a second to import
-)
+TRAINING_FILE = "training.json"  # of scripts/train.py; its reader takes a second to import
 PAGE = Path("src/keepaway_transfer/docs/results.md")
 
 

@@ -21,7 +21,7 @@ from page_parts import with_part
 
 from keepaway_agent.fidelity.reference import reference_curves
 from keepaway_transfer.reports.evidence import Evidence, Studies, difference, read_evidence
-from keepaway_transfer.reports.never_hurts import TABLES, best_row, worse
+from keepaway_transfer.reports.never_hurts import TABLES, best_row, nearest_constant, worse
 from keepaway_transfer.reports.page_parts import elsewhere
 from keepaway_transfer.reports.statistics import Comparison, Interval
 from keepaway_transfer.reports.summary import verdict
@@ -117,10 +117,7 @@ def claims(studies: Studies) -> list[tuple[str, bool]]:
     early = studies["confirmation"]
     few = early.best("total")
     ahead = early.rows[few].against[early.scratch]
-    constants = studies["constants"]
-    starts = [name for name in constants.rows if not constants.row(name).stages]
-    near = min(starts, key=lambda name: constants.rows[name].total.estimate)
-    nearest = difference((constants, near), (early, few), "total_hours")
+    nearest = nearest_constant(studies)
     totals = [best_row(studies, name, "total") for name in TABLES if name in studies]
     real = {arm["source_hours"]: arm for arm in elsewhere()["real_server"]["arms"]}
     scratch, most = real[0.0], real[max(real)]
@@ -154,9 +151,10 @@ def claims(studies: Studies) -> list[tuple[str, bool]]:
         (
             f"In all hours {few} episodes of 3v2 at a level of 5 s (`{early.row(few).variant}`)"
             f" save {spread(ahead.total)} h against that constant on new trials, and"
-            f" {spread(nearest)} against the best of three, {near}; no other way does.",
+            f" {spread(nearest.saved)} against the best of three, {nearest.constant}; no other way"
+            " does.",
             verdict(ahead.total, ahead.total_holm) == "saves"
-            and nearest.low > 0
+            and verdict(nearest.saved, nearest.p_value) == "saves"
             and not any(one.verdict == "saves" for one in totals),
         ),
     ]

@@ -18,7 +18,7 @@ Key = tuple[str, int]  # a row's name and a trial's number
 PlayBatch = Callable[[Study, Sequence[Key]], list[StudyTrial]]
 
 GOLDEN_SECTION = (math.sqrt(5.0) - 1.0) / 2.0
-TRIALS_A_SOURCE = 5
+TRIALS_A_SOURCE = 5  # of a batch, at most, where rows share source runs
 TYPICAL_TARGET_EPISODES = 12_000  # of Table 2; to weigh trials in the estimate of the time left
 
 
