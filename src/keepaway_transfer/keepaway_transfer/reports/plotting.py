@@ -24,6 +24,7 @@ ROW_COLOURS = ("#444444", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
 """Okabe and Ito's, which colour-blind people can tell apart; the first is for the scratch row."""
 FAINT, BAND = 0.45, 0.18  # opacity of single trials and of intervals
 HOURS = "Simulated hours to threshold"
+WIDE = 45  # letters of a label that leave no place for another beside it
 LINE = 155  # letters of the line below the axes
 
 
@@ -63,7 +64,7 @@ def learning_curves(
     axes.set_xlim(left=0)
     figure.legend(
         title="mean of all trials, 95 %; thin: single ones", title_fontsize=8, fontsize=9,
-        frameon=False, loc="outside upper center", ncols=2,
+        frameon=False, loc="outside upper center", ncols=1 if max(map(len, groups)) > WIDE else 2,
     )  # fmt: skip
     return figure
 
@@ -76,6 +77,7 @@ def times_by_amount(
     *,
     title: str,
     amount: str,
+    beside: str = "from scratch",
 ) -> Figure:
     """Hours to the threshold by how much of something came before.
 
@@ -86,10 +88,11 @@ def times_by_amount(
         scratch: hours of learning from scratch, a band across.
         title: above the axes.
         amount: what the rows have more and more of, below the axes.
+        beside: what the band is, if that row does not learn from scratch.
     """
     figure, axes = _figure(title, amount, HOURS)
     axes.axhspan(scratch.low, scratch.high, color=ROW_COLOURS[0], alpha=BAND, linewidth=0)
-    axes.axhline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label="from scratch")
+    axes.axhline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label=beside)
     places = np.arange(len(rows))
     for label, intervals, colour, shift in _both_times(target, total):
         estimate, low, high = np.array(intervals).T
@@ -110,6 +113,7 @@ def times_by_way(
     scratch: Interval,
     *,
     title: str,
+    beside: str = "from scratch",
 ) -> Figure:
     """Hours to the threshold by the way of transfer, one row under the other.
 
@@ -119,10 +123,11 @@ def times_by_way(
         total: hours on source and target task together.
         scratch: hours of learning from scratch, a band from top to bottom.
         title: above the axes.
+        beside: what the band is, if that row does not learn from scratch.
     """
     figure, axes = _figure(title, HOURS, "", height=1.6 + 0.3 * len(rows))
     axes.axvspan(scratch.low, scratch.high, color=ROW_COLOURS[0], alpha=BAND, linewidth=0)
-    axes.axvline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label="from scratch")
+    axes.axvline(scratch.estimate, color=ROW_COLOURS[0], linestyle=":", label=beside)
     places = np.arange(len(rows))[::-1]
     for label, intervals, colour, shift in _both_times(target, total):
         estimate, low, high = np.array(intervals).T

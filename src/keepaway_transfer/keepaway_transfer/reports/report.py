@@ -236,12 +236,15 @@ def _time_figures(
         [row.total for row in rows],
         next(row.target for row in rows if row.name == study.references[0]),
     )
+    beside = _label(next(row for row in study.rows if row.name == study.references[0]))
     many = not amount and len(rows) > len(plotting.ROW_COLOURS)
     shown = [row for row in rows if row.name in drawn] if many else rows
     return {
-        "time_to_threshold": plotting.times_by_amount(*times, title=goal, amount=amount)
+        "time_to_threshold": plotting.times_by_amount(
+            *times, title=goal, amount=amount, beside=beside
+        )
         if amount
-        else plotting.times_by_way(*times, title=goal),
+        else plotting.times_by_way(*times, title=goal, beside=beside),
         "share_reached": plotting.share_reached(_reached(measures, shown), study.max_hours, goal),
     }
 
