@@ -4,9 +4,11 @@
     .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2
     .venv/bin/python scripts/study.py table2 --workers 2 --out results/table2 --resume
     .venv/bin/python scripts/study.py mine.toml --scheduler tcp://cluster:8786 --out results/mine
+    .venv/bin/python scripts/study.py mine.toml --known results/table2 --out results/mine
 
-Ctrl-C, `kill` and a closed terminal stop it; --resume continues it, whatever stopped it.
-scripts/analyze.py makes the report.
+Ctrl-C, `kill` and a closed terminal stop it; --resume continues it, whatever stopped it. Rows that
+start like those of --known results are not played again, but for one trial of each, which must come
+out the same. scripts/analyze.py makes the report.
 """
 
 import argparse
@@ -14,7 +16,7 @@ import logging
 import os
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,8 +31,9 @@ from keepaway_sim.version import code_version
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.batch import play_batch
 from keepaway_transfer.studies.experiment import StudyProgress, run
+from keepaway_transfer.studies.known import check_known, first_of_each_row, known_trials
 from keepaway_transfer.studies.processes import WorkerExecutor
-from keepaway_transfer.studies.results import open_results, pack
+from keepaway_transfer.studies.results import ResultsFolder, open_results, pack, read_results
 from keepaway_transfer.studies.study import Study, load_study
 
 
@@ -64,6 +67,7 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
         ) as results,
         _executor(arguments) as executor,
     ):
+        _take_known(study, arguments.known, results, executor, interruption)
         progress = StudyProgress(study, results.done)
         with ProgressBar(
             "study", progress.trials, "trials", done=progress.done, period=0, estimates=False
@@ -77,6 +81,25 @@ def _run(study: Study, arguments: argparse.Namespace, interruption: Interruption
     pack(arguments.out)
     print(f"{progress.done} trials in {arguments.out}; report: scripts/analyze.py {arguments.out}")
     return 0
+
+
+def _take_known(
+    study: Study,
+    folders: Sequence[Path],
+    results: ResultsFolder,
+    executor: Executor,
+    interruption: Interruption,
+) -> None:
+    """Take trials over from other results, once the first of each row came out the same here."""
+    known = known_trials(study, [read_results(folder) for folder in folders])
+    left = [key for key in known if key not in results.done]
+    if not left:
+        return
+    again = first_of_each_row(left)
+    print(f"study: {len(left)} trials are known; playing {len(again)} of them again", flush=True)
+    check_known(study, executor.submit(play_batch, study, again).result(), known)
+    with interruption.shield():
+        results.take_over(known.values())
 
 
 @contextmanager
@@ -103,6 +126,10 @@ def _parse() -> argparse.Namespace:
     )
     parser.add_argument("study", help="a study of the package, or the path of a TOML file")
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument(
+        "--known", type=Path, nargs="+", default=(), metavar="FOLDER",
+        help="results whose equal trials are taken over",
+    )  # fmt: skip
     parser.add_argument("--trials", type=int, help="trials a row; default the study's")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--scheduler", help="address of a Dask scheduler, instead of processes")

@@ -132,3 +132,21 @@ def test_a_cluster_of_two_workers_gives_the_same_results(whole, tmp_path):
         )
     assert done.returncode == 0, done.stderr
     assert trials_in(tmp_path / "x") == trials_in(whole[0])
+
+
+def test_trials_that_are_known_are_not_played_again(whole, tmp_path):
+    done = study("--out", tmp_path / "more", "--trials", 5, "--known", whole[0])
+    assert done.returncode == 0, done.stderr
+    assert "study: 12 trials are known; playing 3 of them again" in done.stdout
+    assert len(trials_in(tmp_path / "more")) == 3  # the fifth of each row
+    records = read_results(tmp_path / "more").records
+    assert len(records) == 15
+    assert set(read_results(whole[0]).records) < set(records)
+
+
+def test_known_results_that_are_not_there_are_refused_in_one_line(tmp_path):
+    done = study("--out", tmp_path / "out", "--known", tmp_path / "none")
+    assert done.returncode == 1
+    assert (
+        done.stderr.strip() == f"study: {tmp_path / 'none'} holds no results: it has no study.json"
+    )

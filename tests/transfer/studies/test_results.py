@@ -1,5 +1,6 @@
 """Results land trial by trial, survive a kill, and are never mixed or overwritten."""
 
+import dataclasses
 import fcntl
 import multiprocessing
 
@@ -133,6 +134,17 @@ def test_a_study_goes_on_where_its_packed_trials_end(tmp_path):
     pack(tmp_path)
     assert [record.number for record in read_results(tmp_path).records] == [0, 1, 2]
     assert [record.number for record in read_records(tmp_path / "trials.parquet")] == [0, 1, 2]
+
+
+def test_trials_of_other_results_are_taken_over_beside_those_that_are_there(tmp_path):
+    append(tmp_path, 0)
+    mine, other = record_of(trial(0), STUDY), record_of(trial(1), STUDY)
+    with opened(tmp_path, resume=True) as results:
+        results.take_over([dataclasses.replace(mine, code_version="another"), other])
+        assert results.done == {("4", 0), ("4", 1)}
+        results.append(trial(2))
+    pack(tmp_path)
+    assert read_results(tmp_path).records == (mine, other, record_of(trial(2), STUDY))
 
 
 def test_results_packed_into_another_folder_are_results(tmp_path):

@@ -13,7 +13,7 @@ import fcntl
 import json
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -146,17 +146,27 @@ def pack(folder: Path | str, into: Path | str | None = None) -> Path:
 
 
 class ResultsFolder:
-    """A results folder that one running study writes to. Made by `open_results`."""
+    """A results folder that one running study writes to. Made by `open_results`.
 
-    def __init__(self, file: IO[str], done: frozenset[tuple[str, int]]) -> None:
-        self._file = file
-        self.done = done  # keys of the trials that were there when it was opened
+    Attributes:
+        done: keys of the trials that are there, but those appended since it was opened.
+    """
+
+    def __init__(self, folder: Path, file: IO[str], done: frozenset[tuple[str, int]]) -> None:
+        self._folder, self._file = folder, file
+        self.done = done
 
     def append(self, trial: StudyTrial) -> None:
         """Add a trial and wait until it is on the disk."""
         self._file.write(json.dumps(asdict(trial), separators=(",", ":"), allow_nan=False) + "\n")
         self._file.flush()
         os.fsync(self._file.fileno())
+
+    def take_over(self, records: Iterable[Record]) -> None:
+        """Add what another study has kept of trials, those that are not done yet."""
+        fresh = [one for one in records if one.key not in self.done]
+        write_records(self._folder / RECORDS_FILE, (*_read_packed(self._folder), *fresh))
+        self.done |= {one.key for one in fresh}
 
 
 @contextmanager
@@ -197,7 +207,8 @@ def open_results(
             write_whole(folder / STUDY_FILE, json.dumps(head, indent=1, allow_nan=False) + "\n")
         _cut_off_half_a_line(file)
         done = {record.key for record in _read_packed(folder)}
-        yield ResultsFolder(file, frozenset(done.union(one.key for one in read_trials(folder))))
+        done.update(one.key for one in read_trials(folder))
+        yield ResultsFolder(folder, file, frozenset(done))
 
 
 def _check_same(folder: Path, study: Study, code_version: str, any_code: bool) -> None:
