@@ -112,7 +112,7 @@ def test_what_the_way_of_carrying_alone_saves_after_too_much_training_is_told(st
     text = page(studies)
     assert "After 6,000 episodes 4v3 takes 45.00 [" in text
     assert "h as `rescaled` does: the way of carrying alone takes 25.00 [25.00, 25.00] h" in text
-    assert "`variants_6000`, against optimistic at 5 s:" in text
+    assert "<summary>variants_6000, against optimistic at 5 s</summary>" in text
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from keepaway_transfer.reports.evidence import Evidence, Studies, difference
 from keepaway_transfer.reports.page_parts import (
     Lines,
     by_verdict,
+    folded,
     less,
     listed,
     not_run,
@@ -76,8 +77,8 @@ def never_hurts(studies: Studies) -> Lines:
     lines += _confirmation(studies)
     for name in tables:
         if (table := studies[name]) is not studies["table2"]:
-            lines += ["", f"`{name}` against scratch:", ""]
-            lines += study_table(table, table.scratch, "episodes of 3v2")
+            rows = study_table(table, table.scratch, "episodes of 3v2")
+            lines += folded(f"{name}, against scratch", rows)
     return lines
 
 

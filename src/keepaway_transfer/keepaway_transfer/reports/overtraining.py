@@ -18,7 +18,7 @@ from keepaway_transfer.reports.page_parts import (
     not_run,
     parts_of_rho,
     shown_picture,
-    study_table,
+    tables_of_references,
 )
 from keepaway_transfer.reports.report import shown_p, spread
 from keepaway_transfer.reports.statistics import Comparison, holm
@@ -68,10 +68,8 @@ def overtraining(studies: Studies) -> Lines:
         *(not_run(*missing) if missing else by_other_ways(studies)),
     ]
     if (variants := studies.get("variants_6000")) is not None:
-        lines += ["", *_best_way(variants), "", *parts_of_rho(variants)[:-1]]
-        for reference in variants.study.references:
-            lines += ["", f"`variants_6000`, against {reference}:", ""]
-            lines += study_table(variants, reference, "row")
+        lines += ["", *_best_way(variants), "", *parts_of_rho(variants)]
+        lines += tables_of_references(variants, "variants_6000", "way")
         lines += ["", shown_picture("Hours to 9.0 s", "variants_6000")]
     return lines
 

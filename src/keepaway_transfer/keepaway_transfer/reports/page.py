@@ -31,6 +31,7 @@ from keepaway_transfer.reports.page_parts import (
     said_of,
     shown_picture,
     study_table,
+    tables_of_references,
 )
 from keepaway_transfer.reports.report import power, shown_p, spread
 from keepaway_transfer.reports.statistics import holm
@@ -131,7 +132,7 @@ def _rows(studies: Studies) -> Lines:
         lines += ["", "### 5v4", "", *note(fivevfour), *_fivevfour(fivevfour)]
     if (variants := studies.get("variants_1000")) is not None:
         lines += ["", "### Other ways than rho (`variants_1000`)", "", *parts_of_rho(variants)]
-        lines += _variants(variants)
+        lines += tables_of_references(variants, "variants_1000", "way")
         picture = shown_picture("Hours to 9.0 s by the way of transfer", "variants_1000")
         lines += ["", picture]
     return lines
@@ -175,13 +176,6 @@ def _at_lower_threshold(studies: Studies) -> Lines:
     )
     title = f"### The same trials to {LOWER_THRESHOLD:g} s"
     return ["", title, "", words, "", *study_table(lower, lower.scratch, "episodes of 3v2")]
-
-
-def _variants(variants: Evidence) -> Lines:
-    lines: Lines = []
-    for reference in variants.study.references:
-        lines += [f"Against {reference}:", "", *study_table(variants, reference, "way"), ""]
-    return lines[:-1]
 
 
 def _optimism(studies: Studies) -> Lines:

@@ -98,6 +98,20 @@ def study_table(one: Evidence, reference: str, rows_are: str) -> Lines:
     return lines + [_table_row(row, row.against.get(reference)) for row in one.rows.values()]
 
 
+def folded(title: str, table: Lines) -> Lines:
+    """A table that backs what was said elsewhere: a click on its title opens it."""
+    return ["", "<details>", f"<summary>{title}</summary>", "", *table, "", "</details>"]
+
+
+def tables_of_references(one: Evidence, name: str, rows_are: str) -> Lines:
+    """A study's rows against scratch, and, folded, against its other references."""
+    first, *others = one.study.references
+    lines = [f"`{name}`, against {first}:", "", *study_table(one, first, rows_are)]
+    for reference in others:
+        lines += folded(f"{name}, against {reference}", study_table(one, reference, rows_are))
+    return lines
+
+
 def _table_row(row: RowSummary, found: Against | None) -> str:
     line = (
         f"| {row.name} | {row.reached} of {row.trials} | {spread(row.target)}"
