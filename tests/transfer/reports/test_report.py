@@ -185,6 +185,12 @@ def test_a_report_of_records_without_episodes_has_no_curves(worked, tmp_path):
         measure_trials(dataclasses.replace(worked, records=tuple(bare)), threshold=800.0)
 
 
+def test_hours_are_not_drawn_where_hardly_any_trial_reached_the_threshold(worked, tmp_path):
+    late = [dataclasses.replace(one, crossed=one.number == 0) for one in worked.records]
+    write_report(dataclasses.replace(worked, records=tuple(late)), tmp_path)
+    assert {path.stem for path in tmp_path.glob("*.png")} == {"learning_curves", "durations"}
+
+
 def test_what_the_trials_could_have_shown_is_told_in_hours(worked, tmp_path):
     hours = [5.5, 7.5, 10.0]
     text = write_report(worked, tmp_path)

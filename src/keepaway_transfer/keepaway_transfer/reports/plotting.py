@@ -219,7 +219,7 @@ def durations(groups: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> 
             )  # fmt: skip
     axes.set_xlim(left=0)
     axes.set_ylim(0, 1.02)
-    axes.legend(frameon=False, loc="upper right")  # where durations leave room
+    figure.legend(frameon=False, fontsize=9, loc="outside upper center")
     return figure
 
 

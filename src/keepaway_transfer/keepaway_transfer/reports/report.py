@@ -71,7 +71,8 @@ def write_report(
 ) -> str:
     """Write `table.md` and the figures into a folder; files there are replaced.
 
-    Figures that need episodes are left out where the records have none.
+    Figures that need episodes are left out where the records have none, those of hours where
+    hardly any trial reached the threshold.
 
     Args:
         results: that were read.
@@ -211,11 +212,7 @@ def _figures(
 ) -> dict[str, Figure]:
     study = results.study
     records = {name: [one for one in results.records if one.row == name] for name in drawn}
-    figures = (
-        _time_figures(study, measures, rows, drawn, threshold)
-        if any(r.reached for r in rows)
-        else {}
-    )
+    figures = _time_figures(study, measures, rows, drawn, threshold) if hours_tell(rows) else {}
     if all(one.has_episodes for row in records.values() for one in row):
         figures |= _episode_figures(study, records, threshold)
     return figures
