@@ -31,23 +31,27 @@ def elsewhere() -> dict[str, Any]:
     return data
 
 
-def said_of(one: Evidence, measure: str, what: str, rows: str) -> Lines:
-    """In a sentence which rows save, cost, or do neither against scratch.
+def said_of(
+    one: Evidence, measure: str, what: str, rows: str, reference: str | None = None
+) -> Lines:
+    """In a sentence which rows save, cost, or do neither against a reference.
 
     Args:
         one: a study.
         measure: "target" or "total".
         what: the hours are, "the time in 4v3".
         rows: what their names are, "after {} episodes of 3v2".
+        reference: the row; by default learning from scratch.
     """
     verdicts = {
         name: _verdict(found, measure)
         for name, row in one.rows.items()
-        if (found := row.against.get(one.scratch)) is not None
+        if (found := row.against.get(reference or one.scratch)) is not None
     }
     if not verdicts:
         return []
-    return [f"Against learning from scratch, {what} is {by_verdict(verdicts, rows)}."]
+    against = reference or "learning from scratch"
+    return [f"Against {against}, {what} is {by_verdict(verdicts, rows)}."]
 
 
 def by_verdict(verdicts: Mapping[str, str], rows: str) -> str:
