@@ -31,7 +31,7 @@ from keepaway_sim.version import code_version
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.batch import play_batch
 from keepaway_transfer.studies.experiment import StudyProgress, run
-from keepaway_transfer.studies.known import check_known, first_of_each_row, known_trials
+from keepaway_transfer.studies.known import check_known, known_trials, to_play_again
 from keepaway_transfer.studies.processes import WorkerExecutor
 from keepaway_transfer.studies.results import ResultsFolder, open_results, pack, read_results
 from keepaway_transfer.studies.study import Study, load_study
@@ -92,14 +92,14 @@ def _take_known(
 ) -> None:
     """Take trials over from other results, once the first of each row came out the same here."""
     known = known_trials(study, [read_results(folder) for folder in folders])
-    left = [key for key in known if key not in results.done]
+    left = {key: record for key, record in known.items() if key not in results.done}
     if not left:
         return
-    again = first_of_each_row(left)
+    again = to_play_again(left)
     print(f"study: {len(left)} trials are known; playing {len(again)} of them again", flush=True)
     check_known(study, executor.submit(play_batch, study, again).result(), known)
     with interruption.shield():
-        results.take_over(known.values())
+        results.take_over(left.values())
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import pytest
 
 from keepaway_transfer.errors import StudyError
 from keepaway_transfer.studies.batch import play_batch
-from keepaway_transfer.studies.known import check_known, first_of_each_row, known_trials
+from keepaway_transfer.studies.known import check_known, known_trials, to_play_again
 from keepaway_transfer.studies.results import StudyResults, record_of
 from keepaway_transfer.studies.study import Row, Stage, load_study
 
@@ -70,7 +70,7 @@ def test_sources_that_are_shared_are_other_runs(results):
 
 def test_a_trial_that_comes_out_otherwise_is_refused_by_its_row(results):
     known = known_trials(OTHER, [results])
-    first = first_of_each_row(list(known))
+    first = to_play_again(known)
     assert first == [("four", 0), ("scratch", 0)]
     played = play_batch(OTHER, first)
     known["four", 0] = dataclasses.replace(known["four", 0], blocks=(1,))
@@ -78,3 +78,11 @@ def test_a_trial_that_comes_out_otherwise_is_refused_by_its_row(results):
         StudyError, match=r"row 'four', trial 0: .* of another world, leave --known"
     ):
         check_known(OTHER, played, known)
+
+
+def test_a_trial_of_each_row_and_version_is_played_again(results):
+    other = attrs.evolve(OTHER, trials=2)
+    known = known_trials(other, [results])
+    assert to_play_again(known) == [("four", 0), ("scratch", 0)]
+    known["scratch", 1] = dataclasses.replace(known["scratch", 1], code_version="0.2.0")
+    assert to_play_again(known) == [("four", 0), ("scratch", 0), ("scratch", 1)]

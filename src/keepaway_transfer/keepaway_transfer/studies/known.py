@@ -2,11 +2,12 @@
 
 By the seed plan (`batch`) a row from scratch, say, is the same in every study of one seed, world,
 learner and goal. A study takes such trials over from results that are there, and plays the first of
-each row itself: were it another, the results would be of another world, and none is taken.
+each row and version itself: were it another, the results would be of another world, and none is
+taken.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from keepaway_transfer.errors import StudyError
@@ -31,16 +32,15 @@ def known_trials(study: Study, others: Sequence[StudyResults]) -> dict[Key, Reco
     return found
 
 
-def first_of_each_row(known: Sequence[Key]) -> list[Key]:
-    """The keys to play again, to see that they come out the same.
+def to_play_again(known: Mapping[Key, Record]) -> list[Key]:
+    """The first trial of each row and each version of the code, which must come out the same."""
+    first: dict[tuple[str, str], Key] = {}
+    for key, record in sorted(known.items(), key=lambda item: item[0]):
+        first.setdefault((record.row, record.code_version), key)
+    return sorted(first.values())
 
-    >>> first_of_each_row([("b", 3), ("a", 1), ("b", 2)])
-    [('a', 1), ('b', 2)]
-    """
-    return sorted({name: (name, number) for name, number in sorted(known, reverse=True)}.values())
 
-
-def check_known(study: Study, played: Sequence[StudyTrial], known: dict[Key, Record]) -> None:
+def check_known(study: Study, played: Sequence[StudyTrial], known: Mapping[Key, Record]) -> None:
     """Refuse known trials if one of them, played again, comes out otherwise.
 
     Raises:
