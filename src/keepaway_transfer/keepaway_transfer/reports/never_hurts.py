@@ -143,8 +143,9 @@ def _said(what: str, best: list[Best]) -> str:
     if not beats:
         nearest = max(best, key=lambda one: one.saved.difference)
         return (
-            f"In {what} no way is shown to beat the best constant start; nearest to it is"
-            f" `{nearest.study}` after {int(nearest.row):,} episodes, with {less(nearest.saved)}."
+            f"In {what} no way of the table is shown to beat the best constant start; nearest to it"
+            f" is `{nearest.study}` after {int(nearest.row):,} episodes, with"
+            f" {less(nearest.saved)}."
         )
     ways = [f"`{one.study}` after {int(one.row):,} episodes ({less(one.saved)})" for one in beats]
     return f"In {what} the best constant start is beaten by {listed(ways)}."
