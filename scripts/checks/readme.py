@@ -134,10 +134,10 @@ def claims(studies: Studies) -> list[tuple[str, bool]]:
         (
             "A constant start is within an hour of the best amount; in 5v4 it takes"
             f" {in_5v4['5 s']} h, after 4v3 {in_5v4['4v3']}. Of what 1,000 episodes"
-            f" of 3v2 carry, the mean value alone saves {level.difference:.1f} h more than all of"
-            f" it; a shuffled mapping saves {gains['shuffled']} h where rho saves {gains['rho']}."
-            " After 6,000 the"
-            f" mapping matters: shuffled it takes {takes['shuffled']} h, by rho {takes['rho']}.",
+            f" of 3v2 carry, the mean value alone saves {spread(level)} h more than all of it; a"
+            f" shuffled mapping saves {gains['shuffled']} h where rho saves {gains['rho']}. After"
+            f" 6,000 the mapping matters: shuffled it takes {takes['shuffled']} h, by rho"
+            f" {takes['rho']}.",
             max(abs(beside.low), abs(beside.high)) < 1 and level.low > 0 and mapping.low > 0,
         ),
         (
