@@ -26,6 +26,7 @@ from keepaway_agent.errors import AgentError
 from keepaway_agent.nodes.scripted_simulator import ScriptedSimulator
 from keepaway_sim.cli.options import ros_arguments
 from keepaway_sim.cli.processes import Processes, script_command
+from keepaway_sim.ros.running import end_ros
 
 AGENT = "agent"
 
@@ -35,7 +36,10 @@ def main() -> int:
     args = parse()
     with own_domain(args.domain) as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
-        return check(args)
+        try:
+            return check(args)
+        finally:
+            end_ros()
 
 
 @contextmanager
@@ -74,8 +78,6 @@ def check(args: argparse.Namespace) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    finally:
-        rclpy.try_shutdown()
     if not is_there:
         answers = sum(each.answer_time is not None for each in simulator.log)
         print(

@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from keepaway_sim.errors import KeepawayError
+from keepaway_sim.ros.running import end_ros
 from keepaway_sim.ros.subscribing import message_class
 
 HIDDEN = ("/parameter_events", "/rosout")
@@ -40,7 +41,7 @@ def main() -> int:
         print(f"graph: {error}", file=sys.stderr)
         return 1
     finally:
-        rclpy.try_shutdown()
+        end_ros()
     return 0
 
 

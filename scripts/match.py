@@ -44,7 +44,7 @@ from keepaway_sim.match.settings import MatchSettings, named_texts
 from keepaway_sim.nodes import simulator
 from keepaway_sim.nodes.scoreboard import Scoreboard
 from keepaway_sim.nodes.simulator import Simulator
-from keepaway_sim.ros.running import ignore_signals, received_signals
+from keepaway_sim.ros.running import end_ros, ignore_signals, received_signals
 from keepaway_sim.task import Role as TaskRole
 from keepaway_sim.task import Task
 from keepaway_sim.world.config import Config
@@ -92,6 +92,8 @@ def main() -> int:
             announce(args)
         play = play_in_one_process if args.single_process else play_in_processes
         board, failed = play(args, members(args, task), signals)
+        board.conclude()
+        report(args, board.summary())
     except (AgentError, KeepawayError, MatchError, OSError) as error:
         print(f"match: {error}", file=sys.stderr)
         return 1
@@ -99,9 +101,7 @@ def main() -> int:
         print("match: stopped while it compiled", file=sys.stderr)
         return 128 + signals[0]
     finally:
-        rclpy.try_shutdown()
-    board.conclude()
-    report(args, board.summary())
+        end_ros()
     ignore_signals(SIGNALS)
     if signals:
         return 128 + signals[0]  # as shells expect it: 130 after Ctrl-C

@@ -26,4 +26,4 @@ def parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(parse_node_arguments(parser(), sys.argv[1:])))
+    main(parse_node_arguments(parser(), sys.argv[1:]))

@@ -37,7 +37,7 @@ from keepaway_sim.cli.interrupts import Stopped
 from keepaway_sim.cli.options import add_options, parse_node_arguments
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.replayer import Replayer, ReplayerSettings, stoppable
-from keepaway_sim.ros.running import check_arguments
+from keepaway_sim.ros.running import check_arguments, end_ros
 from keepaway_sim.version import code_version
 from keepaway_sim.wire.messages import SECOND
 
@@ -76,7 +76,7 @@ def main() -> int:
     except (Quit, ExternalShutdownException):
         pass
     finally:
-        rclpy.try_shutdown()
+        end_ros()
     return 0
 
 

@@ -26,7 +26,7 @@ from keepaway_sim.cli.interrupts import Interruption, Stopped
 from keepaway_sim.cli.options import numbers_in
 from keepaway_sim.errors import KeepawayError
 from keepaway_sim.nodes.spectator import DRAIN_PERIOD, Spectator
-from keepaway_sim.ros.running import check_arguments
+from keepaway_sim.ros.running import check_arguments, end_ros
 from keepaway_sim.view.page import replay_page
 from keepaway_sim.view.server import Server
 from keepaway_sim.world.config import CYCLE_TIME
@@ -78,7 +78,7 @@ def watch(host: str, port: int, ros: list[str]) -> int:
         return stopped.code
     finally:
         server.close()
-        rclpy.try_shutdown()
+        end_ros()
 
 
 def take_picture(args: argparse.Namespace, number: int | None) -> int:

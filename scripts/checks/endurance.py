@@ -57,7 +57,9 @@ def main() -> int:
         finally:
             ended = end(started)
         if killed := [name for name, code in ended.items() if code == -signal.SIGKILL]:
-            print(f"endurance: killed, as they did not end: {', '.join(killed)}", file=sys.stderr)
+            for name in killed:
+                said = (folder / f"{name}.err").read_text()[-2000:]
+                print(f"endurance: {name} did not end and was killed: {said}", file=sys.stderr)
             return 1
         summary = json.loads((folder / "match.out").read_text().splitlines()[-1])
         written = sum(file.stat().st_size for file in folder.rglob("*.mcap")) / MEGABYTE

@@ -50,3 +50,24 @@ def test_the_line_names_the_argument(ros: list[str], named: str) -> None:
     assert done.stderr.startswith("simulator: not understood after --ros-args: ")
     assert named in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+HANGS_AT_ITS_END = """
+import time
+import rclpy
+from keepaway_sim.ros import running
+
+running.LONGEST_EXIT = 0.2
+rclpy.try_shutdown = lambda: time.sleep(3600)
+print("all is told")
+running.end_ros()
+"""
+
+
+def test_a_middleware_that_hangs_at_the_end_takes_nothing_with_it() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HANGS_AT_ITS_END], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout == "all is told\n"
+    assert "in end_ros" in done.stderr

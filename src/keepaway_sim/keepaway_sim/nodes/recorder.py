@@ -7,22 +7,15 @@ between. The simulator can wait for it: `recorded` has the simulated time that i
 
 import json
 import math
-import signal
 import struct
-import sys
-import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
-import rclpy
 from builtin_interfaces.msg import Time
-from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from keepaway_sim.bags.checked import check_match
@@ -32,7 +25,7 @@ from keepaway_sim.bags.topics import default_qos
 from keepaway_sim.bags.writer import BagWriter
 from keepaway_sim.errors import LOG_PERIOD, KeepawayError
 from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
-from keepaway_sim.ros.running import check_arguments
+from keepaway_sim.ros.running import run_node
 from keepaway_sim.ros.subscribing import listen, offered_qos, take_all, to_profile
 from keepaway_sim.settings import flat, setting
 from keepaway_sim.version import code_version
@@ -264,36 +257,28 @@ class Recorder(Node):
             self._recorded.publish(Time(**stamp(time_ns)))
 
 
-def main(args: list[str] | None = None) -> int:
+def main(args: list[str] | None = None) -> None:
     """Record until SIGINT or SIGTERM.
 
-    Returns:
-        0 where nothing is missing; 1 where something is, nothing came, or nothing can be recorded.
+    Raises:
+        SystemExit: with 0 where nothing is missing; with 1 where something is, nothing came, or
+            nothing can be recorded.
     """
-    check_arguments("recorder", (RecorderSettings,), sys.argv[1:] if args is None else args)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    try:
-        recorder = Recorder()
-    except (KeepawayError, InvalidParameterTypeException) as error:
-        get_logger("recorder").error(str(error))
-        return 1
+    run_node("recorder", _record, (RecorderSettings,), KeepawayError, args)
+
+
+def _record(is_over: Callable[[], bool]) -> None:
+    recorder = Recorder()
     recorder.get_logger().info(f"records to {recorder.bag.path}")
-    try:
-        while not stop.wait(POLL_PERIOD):
-            recorder.poll()
-        report = recorder.finish()
-    except KeepawayError as error:
-        recorder.get_logger().error(str(error))
-        return 1
+    while not is_over():
+        recorder.poll()
+        time.sleep(POLL_PERIOD)
+    report = recorder.finish()
     complete = recorder.gaps.is_complete()
     log = recorder.get_logger().info if complete else recorder.get_logger().warning
     log(f"{recorder.bag.message_count} messages in {recorder.bag.path}: {report}")
-    rclpy.try_shutdown()
-    return int(not complete)
+    raise SystemExit(int(not complete))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

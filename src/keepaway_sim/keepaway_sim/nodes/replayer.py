@@ -32,7 +32,7 @@ from keepaway_sim.bags.topics import Recorded, Topic
 from keepaway_sim.cli.interrupts import SIGNALS, Stopped
 from keepaway_sim.errors import KeepawayError, one_line
 from keepaway_sim.ros.parameters import declare_settings, warn_of_unknown
-from keepaway_sim.ros.running import check_arguments
+from keepaway_sim.ros.running import check_arguments, end_ros
 from keepaway_sim.ros.subscribing import check_topic_name, message_class, to_profile
 from keepaway_sim.settings import setting
 from keepaway_sim.wire.messages import SECOND
@@ -286,7 +286,7 @@ def main(args: list[str] | None = None) -> int:
     except ExternalShutdownException:
         pass
     finally:
-        rclpy.try_shutdown()
+        end_ros()
     return 0
 
 

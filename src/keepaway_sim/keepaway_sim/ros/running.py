@@ -6,6 +6,7 @@ test holds the two together.
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import gc
 import signal
@@ -64,16 +65,27 @@ def run_node(
     except KeyboardInterrupt:  # StoppedCompiling, or what a compiling child makes of a Ctrl-C
         print(f"{name}: stopped while it compiled", file=sys.stderr)  # noqa: T201
     finally:
-        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)  # everything is saved
-        rclpy.try_shutdown()
+        end_ros()
         ignore_signals(_SIGNALS)
+
+
+def end_ros() -> None:
+    """End ROS in a program that has nothing left to do: everything is saved and told.
+
+    Where the middleware hangs, its stacks are printed and it ends with 1 after `LONGEST_EXIT`.
+    """
+    with contextlib.suppress(OSError):  # whoever read it may be gone
+        sys.stdout.flush()
+    faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)
+    rclpy.try_shutdown()
 
 
 def received_signals(numbers: Collection[int]) -> list[int]:
     """The signals that come from now on, in their order; of those numbers, but for ignored ones.
 
     They are noted and raise nothing; only the first raises `StoppedCompiling` where the
-    program compiles, which may take a minute.
+    program compiles, which may take a minute. A list, not an `Event`: what a handler sets may
+    wait for a lock that the code holds which it interrupts, and neither would ever go on.
     """
     received: list[int] = []
 
