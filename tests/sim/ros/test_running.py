@@ -71,3 +71,10 @@ def test_a_middleware_that_hangs_at_the_end_takes_nothing_with_it() -> None:
     assert done.returncode == 1
     assert done.stdout == "all is told\n"
     assert "in end_ros" in done.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_a_program_without_a_terminal_ends_well(closed: str) -> None:
+    program = "from keepaway_sim.ros.running import end_ros; end_ros()"
+    command = f'"{sys.executable}" -c "{program}" {closed}'
+    assert subprocess.run(command, shell=True, check=False).returncode == 0

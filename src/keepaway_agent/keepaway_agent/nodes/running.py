@@ -73,10 +73,12 @@ def end_ros() -> None:
     """End ROS in a program that has nothing left to do: everything is saved and told.
 
     Where the middleware hangs, its stacks are printed and it ends with 1 after `LONGEST_EXIT`.
+    A program may have been started without a standard output, or without one for errors.
     """
     with contextlib.suppress(OSError):  # whoever read it may be gone
-        sys.stdout.flush()
-    faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)
+        print(end="", flush=True)  # noqa: T201
+    if sys.stderr:
+        faulthandler.dump_traceback_later(LONGEST_EXIT, exit=True)
     rclpy.try_shutdown()
 
 
